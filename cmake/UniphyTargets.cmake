@@ -1,0 +1,71 @@
+# uniphy_library(<target> EXPORT <name> [TORCH] SOURCES ... PUBLIC <libs> PRIVATE <libs>)
+# A static library with the alias uniphy::<name>. Sources are relative to the calling folder.
+function(uniphy_library target)
+  cmake_parse_arguments(arg "TORCH" "EXPORT" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  if(NOT arg_SOURCES)
+    set(arg_SOURCES "${PROJECT_SOURCE_DIR}/ops/kernels/error.hpp")
+  endif()
+  add_library(${target} STATIC ${arg_SOURCES})
+  add_library(uniphy::${arg_EXPORT} ALIAS ${target})
+  set_target_properties(${target} PROPERTIES EXPORT_NAME ${arg_EXPORT} LINKER_LANGUAGE CXX)
+  target_compile_features(${target} PUBLIC cxx_std_17)
+  target_include_directories(${target} PUBLIC
+    "$<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>"
+    "$<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/uniphy>")
+  target_link_libraries(${target} PUBLIC ${arg_PUBLIC} PRIVATE ${arg_PRIVATE})
+  if(arg_TORCH)
+    target_link_libraries(${target} PUBLIC uniphy_torch OpenMP::OpenMP_CXX)
+    uniphy_use_torch_pch(${target})
+  endif()
+  set_property(GLOBAL APPEND PROPERTY UNIPHY_INSTALLED_TARGETS ${target})
+endfunction()
+
+# uniphy_binary(<name> SOURCES ... LIBS ... [TORCH])
+function(uniphy_binary name)
+  cmake_parse_arguments(arg "TORCH" "" "SOURCES;LIBS" ${ARGN})
+  add_executable(${name} ${arg_SOURCES})
+  target_link_libraries(${name} PRIVATE ${arg_LIBS})
+  if(arg_TORCH)
+    uniphy_use_torch_pch(${name})
+  endif()
+  install(TARGETS ${name} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+endfunction()
+
+# uniphy_test(NAME <name> SOURCES ... LIBS ... [TORCH])
+# A GoogleTest executable; each of its tests is one CTest test. Without sources: nothing.
+function(uniphy_test)
+  cmake_parse_arguments(arg "TORCH" "NAME" "SOURCES;LIBS" ${ARGN})
+  if(NOT arg_SOURCES)
+    return()
+  endif()
+  add_executable(${arg_NAME} ${arg_SOURCES})
+  target_link_libraries(${arg_NAME} PRIVATE ${arg_LIBS} GTest::gmock GTest::gtest_main)
+  target_compile_definitions(${arg_NAME} PRIVATE
+    UNIPHY_SOURCE_DIR="${PROJECT_SOURCE_DIR}" UNIPHY_BINARY_DIR="${PROJECT_BINARY_DIR}")
+  if(arg_TORCH)
+    uniphy_use_torch_pch(${arg_NAME})
+  endif()
+  # CTest runs tests side by side: threads that spin while they wait would slow the neighbours.
+  gtest_discover_tests(${arg_NAME} DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60
+    PROPERTIES ENVIRONMENT "OMP_WAIT_POLICY=passive" TIMEOUT 300)
+endfunction()
+
+# One precompiled torch/torch.h (20 s per translation unit without it) for every target that
+# includes it; their flags must agree, so all of them compile with OpenMP.
+function(uniphy_use_torch_pch target)
+  if(NOT UNIPHY_PCH)
+    return()
+  endif()
+  if(NOT TARGET uniphy_torch_pch)
+    file(CONFIGURE OUTPUT "${PROJECT_BINARY_DIR}/pch/uniphy_torch_pch.cpp"
+         CONTENT "// Owner of the precompiled torch/torch.h.\n")
+    add_library(uniphy_torch_pch OBJECT "${PROJECT_BINARY_DIR}/pch/uniphy_torch_pch.cpp")
+    target_compile_features(uniphy_torch_pch PUBLIC cxx_std_17)
+    target_link_libraries(uniphy_torch_pch PRIVATE uniphy_torch OpenMP::OpenMP_CXX)
+    target_precompile_headers(uniphy_torch_pch PRIVATE <torch/torch.h>)
+  endif()
+  target_precompile_headers(${target} REUSE_FROM uniphy_torch_pch)
+endfunction()
+if(UNIPHY_TESTS)
+  include(GoogleTest)
+endif()
