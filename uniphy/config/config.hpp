@@ -1,0 +1,173 @@
+#pragma once
+
+// Configuration where every key is declared in the one place that reads it: the reader gives its
+// type, unit, default, range and one line of documentation. The same code runs on a document (then
+// it checks and returns values) and on no document at all (then it collects the table that --help
+// prints).
+//
+//   Config config = Config::load("scene.yaml", {"scene.grid=32"});
+//   Section root = config.root();
+//   Section scene = root.section("scene", "the grid and the walls");
+//   std::int64_t grid = scene.integer("grid", 20, between(8, 1024), "", "nodes a side");
+//   double density = scene.real("density", required, positive(), "kg/m^3", "mass density");
+//   config.finish();  // refuses keys that nobody read
+//
+// Messages: `scene.yaml:12: scene.grid: expected an integer in [8, 1024], found "abc"`.
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "uniphy/config/document.hpp"
+#include "uniphy/config/value.hpp"
+
+namespace uniphy {
+
+/// One row of the table of keys.
+struct KeyInfo {
+  std::string path;      ///< "bodies[].law.mu"
+  std::string type;      ///< "number > 0"
+  std::string unit;      ///< "Pa", or empty
+  std::string fallback;  ///< YAML of the default, or "required"
+  std::string doc;
+  std::string when;  ///< "type: elastic" inside a variant, or empty
+};
+
+class Section;
+
+/// One alternative of Section::variant.
+struct Variant {
+  std::string name;
+  std::string doc;
+  std::function<void(Section&)> read;  ///< declares and reads this alternative's keys
+};
+
+class Config {
+ public:
+  /// Throws Error for an unreadable or malformed file and for a malformed override.
+  static Config load(const std::filesystem::path& file,
+                     const std::vector<std::string>& overrides = {});
+  static Config parse(const std::string& text, const std::string& name = "config",
+                      const std::vector<std::string>& overrides = {});
+  /// No document: readers return defaults (or harmless values of the right type where a key is
+  /// required, one entry where a list is asked for, every alternative of a variant in turn).
+  static Config describe();
+
+  Section root() const;
+  bool describing() const;
+  /// Throws Error naming the first key of the document that no reader declared, with the nearest
+  /// declared key.
+  void finish() const;
+  /// Everything that was read, defaults filled in, as YAML; reading it back gives the same values.
+  std::string resolved() const;
+  /// Every declared key, in the order of the readers.
+  const std::vector<KeyInfo>& keys() const;
+  /// The keys as text of at most `width` columns.
+  std::string table(int width = 100) const;
+
+  struct State;
+
+ private:
+  explicit Config(std::shared_ptr<State> state);
+  std::shared_ptr<State> state_;
+};
+
+/// A map of the document. Copies refer to the same place. Every reader throws Error for a missing
+/// required key, a wrong type, a value out of range or not finite; reading a key twice is a
+/// std::logic_error, for a key has one declaration.
+class Section {
+ public:
+  bool boolean(const std::string& key, Default<bool> fallback, const std::string& doc);
+  std::int64_t integer(const std::string& key, Default<std::int64_t> fallback, const Range& range,
+                       const std::string& unit, const std::string& doc);
+  double real(const std::string& key, Default<double> fallback, const Range& range,
+              const std::string& unit, const std::string& doc);
+  std::string text(const std::string& key, Default<std::string> fallback, const std::string& doc);
+  /// One of `names`.
+  std::string choice(const std::string& key, Default<std::string> fallback,
+                     const std::vector<std::string>& names, const std::string& doc);
+  /// A path as written (relative to the working directory) of a file that must exist; an empty
+  /// default means "none" and is not checked.
+  std::filesystem::path input_file(const std::string& key, Default<std::string> fallback,
+                                   const std::string& doc);
+
+  /// A number, or `word` ("auto", "none"), which reads as nullopt. A nullopt default is the word.
+  std::optional<double> real_or(const std::string& word, const std::string& key,
+                                Default<std::optional<double>> fallback, const Range& range,
+                                const std::string& unit, const std::string& doc);
+
+  std::array<double, 3> vector3(const std::string& key, Default<std::array<double, 3>> fallback,
+                                const Range& range, const std::string& unit,
+                                const std::string& doc);
+  /// [low, high] with low <= high, both in `range`.
+  std::array<double, 2> interval(const std::string& key, Default<std::array<double, 2>> fallback,
+                                 const Range& range, const std::string& unit,
+                                 const std::string& doc);
+  /// `sizes` is the range of the number of entries.
+  std::vector<double> reals(const std::string& key, Default<std::vector<double>> fallback,
+                            const Range& range, const std::string& unit, const std::string& doc,
+                            const Range& sizes = {});
+  std::vector<std::int64_t> integers(const std::string& key,
+                                     Default<std::vector<std::int64_t>> fallback,
+                                     const Range& range, const std::string& unit,
+                                     const std::string& doc, const Range& sizes = {});
+  std::vector<std::string> texts(const std::string& key, Default<std::vector<std::string>> fallback,
+                                 const std::string& doc, const Range& sizes = {});
+  /// Entries from `names`, no name twice.
+  std::vector<std::string> choices(const std::string& key,
+                                   Default<std::vector<std::string>> fallback,
+                                   const std::vector<std::string>& names, const std::string& doc,
+                                   const Range& sizes = {});
+
+  /// A nested map; where it is absent all its keys take their defaults.
+  Section section(const std::string& key, const std::string& doc);
+  /// A nested map, or nullopt where it is absent. Always present while describing.
+  std::optional<Section> optional_section(const std::string& key, const std::string& doc);
+  /// A list of maps. While describing, one entry whose path ends in "[]".
+  std::vector<Section> list(const std::string& key, const std::string& doc,
+                            const Range& sizes = {});
+
+  /// Reads `key` as the name of one of the alternatives and then that alternative's keys, which
+  /// stand beside `key` in this map. While describing all alternatives run. Returns the name.
+  std::string variant(const std::string& key, Default<std::string> fallback,
+                      const std::vector<Variant>& alternatives, const std::string& doc);
+
+  bool describing() const;
+  /// Whether the document gives this key (always false while describing).
+  bool has(const std::string& key) const;
+  /// "bodies.0.law", empty for the root.
+  const std::string& path() const { return path_; }
+  /// The error of a value that only the caller can judge: `file:line: path.key: message`.
+  [[noreturn]] void fail(const std::string& key, const std::string& message) const;
+
+ private:
+  friend class Config;
+  Section(std::shared_ptr<Config::State> state, std::shared_ptr<Node> given,
+          std::shared_ptr<Node> resolved, std::string path);
+
+  std::string full_path(const std::string& key) const;
+  std::shared_ptr<Node> declare(const std::string& key, const std::string& type,
+                                const std::string& unit, const std::string& fallback,
+                                const std::string& doc);
+  [[noreturn]] void missing(const std::string& key, const std::string& expected) const;
+  std::shared_ptr<Node> child(const std::string& key, const std::string& doc, bool& present);
+  template <class T, class Parse, class Show>
+  T scalar(const std::string& key, const Default<T>& fallback, const std::string& type,
+           const std::string& unit, const std::string& doc, T dummy, Parse parse, Show show);
+  template <class T, class Parse, class Show>
+  std::vector<T> sequence(const std::string& key, const Default<std::vector<T>>& fallback,
+                          const std::string& type, const std::string& unit, const std::string& doc,
+                          const Range& sizes, T dummy, Parse parse, Show show);
+
+  std::shared_ptr<Config::State> state_;
+  std::shared_ptr<Node> given_;     ///< what the document says here
+  std::shared_ptr<Node> resolved_;  ///< what was read here, defaults filled in
+  std::string path_;
+};
+
+}  // namespace uniphy

@@ -1,0 +1,85 @@
+#pragma once
+
+// dataset.h5: samples of the constitutive laws along many trajectories.
+//
+//   attributes  format = "uniphy-dataset", version = 1, config = YAML that generated it
+//   /samples/F       [S, 3, 3]  1    trial deformation gradient
+//   /samples/F_proj  [S, 3, 3]  1    projected deformation gradient G(F)
+//   /samples/C       [S, 3, 3]  1/s  affine velocity
+//   /samples/tau     [S, 3, 3]  Pa   Kirchhoff stress of (F_proj, C)
+//   /samples/trajectory [S]     1    row of /trajectories, not decreasing
+//   /trajectories/material   [N]     name of the law
+//   /trajectories/parameters [N, 5]  mu (Pa), lambda (Pa), tau_y (Pa), theta (rad), eta (Pa s);
+//                                    NaN where the law has none
+//   /trajectories/dt [N] s, density [N] kg/m^3, seed [N], shape [N]
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <filesystem>
+#include <limits>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "uniphy/io/hdf5.hpp"
+
+namespace uniphy {
+
+/// mu, lambda, tau_y, theta, eta; NaN where the law has none.
+using MaterialParameters = std::array<double, 5>;
+inline constexpr std::array<const char*, 5> kParameterNames{"mu", "lambda", "tau_y", "theta",
+                                                            "eta"};
+inline MaterialParameters no_parameters() {
+  MaterialParameters parameters;
+  parameters.fill(std::numeric_limits<double>::quiet_NaN());
+  return parameters;
+}
+
+struct TrajectoryRecord {
+  std::string material;
+  MaterialParameters parameters = no_parameters();
+  double dt = 0;       ///< s
+  double density = 0;  ///< kg/m^3
+  std::int64_t seed = 0;
+  std::string shape;
+};
+
+/// Samples of one or many trajectories; all arrays [samples, 3, 3], row-major.
+struct LawSamples {
+  std::vector<double> F;
+  std::vector<double> F_proj;
+  std::vector<double> C;
+  std::vector<double> tau;
+
+  std::int64_t size() const { return static_cast<std::int64_t>(F.size() / 9); }
+};
+
+struct Dataset {
+  std::vector<TrajectoryRecord> trajectories;  ///< [N]
+  LawSamples samples;                          ///< [S], ordered by trajectory
+  std::vector<std::int32_t> trajectory;        ///< [S] row of trajectories
+  std::vector<std::int64_t> first;             ///< [N + 1] samples of i: first[i] ... first[i+1]-1
+  std::string config;
+};
+
+/// Trajectory by trajectory, so that the memory holds one of them.
+class DatasetWriter {
+ public:
+  explicit DatasetWriter(const std::filesystem::path& file, const std::string& config = "",
+                         int gzip = 0);
+  void append(const TrajectoryRecord& record, const LawSamples& samples);
+  /// Writes the table of trajectories and names the file. Nothing is kept without it.
+  void finish();
+  std::int64_t samples() const { return samples_; }
+
+ private:
+  hdf5::Writer writer_;
+  std::vector<TrajectoryRecord> records_;
+  std::int64_t samples_ = 0;
+};
+
+/// Checks format, shapes, finite samples, known material names, the order of /samples/trajectory.
+Dataset read_dataset(const std::filesystem::path& file);
+
+}  // namespace uniphy

@@ -1,0 +1,97 @@
+#pragma once
+
+// trajectory.h5: how an object moved.
+//
+//   attributes  format = "uniphy-trajectory", version = 1, scene = YAML of the scene
+//   /x      [frames, particles, 3]     m     positions
+//   /time   [frames]                   s
+//   /step   [frames]                   1     index of the MPM step
+//   /v      [frames, particles, 3]     m/s   optional
+//   /C      [frames, particles, 3, 3]  1/s   optional, affine velocity
+//   /F      [frames, particles, 3, 3]  1     optional, deformation gradient
+//   /body   [particles]                1     index of the body in the scene
+//   /mass   [particles]                kg
+//   /volume [particles]                m^3   volume at rest
+//   /final/{x,v,C,F}                         the last state, from which a run can go on
+//
+// Numbers are float64, indices int32 (body) and int64 (step). Every dataset has the attributes
+// `units` and `description`. The XDMF file beside it opens the trajectory in ParaView.
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "uniphy/io/hdf5.hpp"
+
+namespace uniphy {
+
+/// One instant of all particles; arrays are row-major, absent ones empty.
+struct ParticleState {
+  std::vector<double> x;  ///< [particles, 3] m
+  std::vector<double> v;  ///< [particles, 3] m/s
+  std::vector<double> C;  ///< [particles, 3, 3] 1/s
+  std::vector<double> F;  ///< [particles, 3, 3]
+};
+
+/// What does not change along a trajectory.
+struct TrajectoryHeader {
+  std::vector<std::int32_t> body;  ///< [particles]
+  std::vector<double> mass;        ///< [particles] kg
+  std::vector<double> volume;      ///< [particles] m^3
+  std::string scene;               ///< YAML
+};
+
+/// Which optional fields every frame stores.
+struct FrameFields {
+  bool v = false;
+  bool C = false;
+  bool F = false;
+};
+
+struct Trajectory : TrajectoryHeader {
+  std::int64_t frames = 0;
+  std::int64_t particles = 0;
+  std::vector<double> time;        ///< [frames] s
+  std::vector<std::int64_t> step;  ///< [frames]
+  std::vector<double> x;           ///< [frames, particles, 3] m
+  std::vector<double> v;           ///< [frames, particles, 3] or empty
+  std::vector<double> C;           ///< [frames, particles, 3, 3] or empty
+  std::vector<double> F;           ///< [frames, particles, 3, 3] or empty
+  ParticleState last;              ///< /final, empty arrays where absent
+
+  const double* positions(std::int64_t frame) const { return x.data() + frame * particles * 3; }
+};
+
+/// Frame by frame, so that a trajectory longer than the memory can be written.
+class TrajectoryWriter {
+ public:
+  /// header.body sets the number of particles.
+  TrajectoryWriter(const std::filesystem::path& file, const TrajectoryHeader& header,
+                   FrameFields fields = {}, int gzip = 0);
+  /// state.x and the declared fields must be there. Times and steps must increase.
+  void append(double time, std::int64_t step, const ParticleState& state);
+  /// Writes /final, names the file, writes the XDMF beside it. Nothing is kept without it.
+  void finish(const ParticleState& last);
+  std::int64_t frames() const { return static_cast<std::int64_t>(times_.size()); }
+
+ private:
+  hdf5::Writer writer_;
+  std::int64_t particles_;
+  FrameFields fields_;
+  std::vector<double> times_;
+  std::int64_t last_step_ = 0;
+};
+
+void write_trajectory(const std::filesystem::path& file, const Trajectory& trajectory);
+
+/// Checks format, shapes, finite positions, increasing times. With `positions_only` v, C, F and
+/// /final stay empty. Throws Error.
+Trajectory read_trajectory(const std::filesystem::path& file, bool positions_only = false);
+
+/// The XDMF text for a trajectory file (relative name `h5_name`) with these frames and fields.
+std::string xdmf_text(const std::string& h5_name, std::int64_t particles,
+                      const std::vector<double>& times, FrameFields fields);
+
+}  // namespace uniphy
