@@ -11,14 +11,13 @@ macro(uniphy_find_packages)
   find_package(nlohmann_json REQUIRED)
   find_package(tinyobjloader REQUIRED)
 
-  # xsimd 8 exports `xsimd`, some later releases `xsimd::xsimd` as well.
+  # Header-only. Only the include directory: Debian 12's target also asks for a library that
+  # does not exist (-lxtl).
   if(NOT TARGET uniphy_xsimd)
+    get_target_property(uniphy_xsimd_include xsimd INTERFACE_INCLUDE_DIRECTORIES)
     add_library(uniphy_xsimd INTERFACE IMPORTED GLOBAL)
-    if(TARGET xsimd::xsimd)
-      target_link_libraries(uniphy_xsimd INTERFACE xsimd::xsimd)
-    else()
-      target_link_libraries(uniphy_xsimd INTERFACE xsimd)
-    endif()
+    set_target_properties(uniphy_xsimd PROPERTIES
+                          INTERFACE_INCLUDE_DIRECTORIES "${uniphy_xsimd_include}")
   endif()
   # yaml-cpp 0.7 exports `yaml-cpp`, 0.8 `yaml-cpp::yaml-cpp`.
   if(NOT TARGET uniphy_yaml)
