@@ -70,3 +70,30 @@ endfunction()
 if(UNIPHY_TESTS)
   include(GoogleTest)
 endif()
+
+# uniphy_add_isa(<target> <isa> <flags>...)
+# Compiles ${uniphy_isa_sources} once more with <flags> and adds the objects to <target>. The object
+# library is <target>_<isa>; tests check its symbols (check_isa_symbols.cmake).
+function(uniphy_add_isa target isa)
+  if(NOT uniphy_isa_sources)
+    return()
+  endif()
+  add_library(${target}_${isa} OBJECT ${uniphy_isa_sources})
+  foreach(property COMPILE_OPTIONS INCLUDE_DIRECTORIES COMPILE_DEFINITIONS LINK_LIBRARIES)
+    get_target_property(value ${target} ${property})
+    if(value)
+      set_target_properties(${target}_${isa} PROPERTIES ${property} "${value}")
+    endif()
+  endforeach()
+  target_compile_options(${target}_${isa} PRIVATE ${ARGN})
+  target_sources(${target} PRIVATE $<TARGET_OBJECTS:${target}_${isa}>)
+endfunction()
+
+# A CTest test that no object of <target>_<isa> can leak code to CPUs without <isa>.
+function(uniphy_add_isa_symbol_test target isa)
+  if(TARGET ${target}_${isa} AND CMAKE_NM AND NOT UNIPHY_SANITIZE)
+    add_test(NAME isa_symbols.${isa} COMMAND ${CMAKE_COMMAND}
+             -DNM=${CMAKE_NM} -DISA=${isa} "-DOBJECTS=$<TARGET_OBJECTS:${target}_${isa}>"
+             -P "${PROJECT_SOURCE_DIR}/cmake/check_isa_symbols.cmake")
+  endif()
+endfunction()
