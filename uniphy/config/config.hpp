@@ -150,19 +150,32 @@ class Section {
   Section(std::shared_ptr<Config::State> state, std::shared_ptr<Node> given,
           std::shared_ptr<Node> resolved, std::string path);
 
+  /// How a value is described in the table and in messages: noun "number", suffix " > 0".
+  struct Kind {
+    std::string noun;
+    std::string suffix;
+    std::string unit;
+    std::string text() const { return noun + suffix; }
+  };
+
   std::string full_path(const std::string& key) const;
-  std::shared_ptr<Node> declare(const std::string& key, const std::string& type,
-                                const std::string& unit, const std::string& fallback,
-                                const std::string& doc);
-  [[noreturn]] void missing(const std::string& key, const std::string& expected) const;
-  std::shared_ptr<Node> child(const std::string& key, const std::string& doc, bool& present);
+  /// Records one declaration; returns the resolved node to fill in.
+  std::shared_ptr<Node> declare(const std::string& key, const Kind& kind,
+                                const std::string& fallback, const std::string& doc);
+  [[noreturn]] void refuse(const std::string& key, const Node& node, const Kind& kind) const;
+  [[noreturn]] void missing(const std::string& key, const Kind& kind) const;
+  /// parse: Node → optional<T>; show: T → YAML text; dummy: what a required key reads as while
+  /// describing.
   template <class T, class Parse, class Show>
-  T scalar(const std::string& key, const Default<T>& fallback, const std::string& type,
-           const std::string& unit, const std::string& doc, T dummy, Parse parse, Show show);
+  T scalar(const std::string& key, const Default<T>& fallback, const Kind& kind,
+           const std::string& doc, const T& dummy, Parse parse, Show show);
   template <class T, class Parse, class Show>
   std::vector<T> sequence(const std::string& key, const Default<std::vector<T>>& fallback,
-                          const std::string& type, const std::string& unit, const std::string& doc,
-                          const Range& sizes, T dummy, Parse parse, Show show);
+                          const Kind& kind, const std::string& doc, const Range& sizes,
+                          const T& dummy, Parse parse, Show show);
+  std::vector<double> reals_of(const std::string& key, const Default<std::vector<double>>& fallback,
+                               const Range& range, const std::string& unit, const std::string& doc,
+                               const Range& sizes);
 
   std::shared_ptr<Config::State> state_;
   std::shared_ptr<Node> given_;     ///< what the document says here

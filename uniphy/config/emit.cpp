@@ -1,0 +1,110 @@
+#include <algorithm>
+
+#include "uniphy/config/document.hpp"
+#include "uniphy/config/value.hpp"
+
+namespace uniphy {
+namespace {
+
+bool is_plain(const std::string& text) {
+  if (text.empty()) return false;
+  const auto plain = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
+           c == '.' || c == '/' || c == '-' || c == '+';
+  };
+  if (!std::all_of(text.begin(), text.end(), plain)) return false;
+  // "---" and "..." end documents, "-" starts a list.
+  return text[0] != '-' || parse_real(text).has_value();
+}
+
+/// Whether a plain text would be read as something other than a string.
+bool looks_typed(const std::string& text) {
+  static const char* const words[] = {"null", "Null", "NULL", "true", "false", "~"};
+  return parse_real(text).has_value() ||
+         std::find(std::begin(words), std::end(words), text) != std::end(words) ||
+         text.find_first_not_of('.') == std::string::npos;
+}
+
+std::string quoted(const std::string& text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') {
+      out += '\\';
+      out += c;
+    } else if (c == '\n') {
+      out += "\\n";
+    } else if (c == '\t') {
+      out += "\\t";
+    } else if (c == '\r') {
+      out += "\\r";
+    } else {
+      out += c;
+    }
+  }
+  return out + '"';
+}
+
+std::string scalar_text(const Node& node) {
+  if (node.kind == Node::Kind::null) return "null";
+  if (node.quoted && looks_typed(node.text)) return quoted(node.text);
+  return is_plain(node.text) ? node.text : quoted(node.text);
+}
+
+bool is_flat(const Node& node) {
+  return std::none_of(node.items.begin(), node.items.end(), [](const auto& item) {
+    return item->kind == Node::Kind::map || item->kind == Node::Kind::list;
+  });
+}
+
+void emit(const Node& node, int indent, bool inline_first, std::string& out);
+
+/// What follows "key:" or "-".
+void emit_value(const Node& node, int indent, std::string& out) {
+  if (node.kind == Node::Kind::map && !node.entries.empty()) {
+    out += '\n';
+    emit(node, indent + 2, false, out);
+  } else if (node.kind == Node::Kind::map) {
+    out += " {}\n";
+  } else if (node.kind == Node::Kind::list && is_flat(node)) {
+    out += " [";
+    for (std::size_t i = 0; i < node.items.size(); ++i) {
+      out += (i ? ", " : "") + scalar_text(*node.items[i]);
+    }
+    out += "]\n";
+  } else if (node.kind == Node::Kind::list) {
+    out += '\n';
+    emit(node, indent + 2, false, out);
+  } else {
+    out += " " + scalar_text(node) + "\n";
+  }
+}
+
+void emit(const Node& node, int indent, bool inline_first, std::string& out) {
+  const std::string blanks(static_cast<std::size_t>(indent), ' ');
+  bool first = inline_first;
+  for (const auto& [key, value] : node.entries) {
+    out += first ? "" : blanks;
+    first = false;
+    out += (is_plain(key) && !looks_typed(key) ? key : quoted(key)) + ":";
+    emit_value(*value, indent, out);
+  }
+  for (const auto& item : node.items) {
+    out += blanks + "-";
+    if (item->kind == Node::Kind::map && !item->entries.empty()) {
+      out += ' ';
+      emit(*item, indent + 2, true, out);
+    } else {
+      emit_value(*item, indent, out);
+    }
+  }
+}
+
+}  // namespace
+
+std::string emit_document(const Node& root) {
+  std::string out;
+  emit(root, 0, false, out);
+  return out;
+}
+
+}  // namespace uniphy
