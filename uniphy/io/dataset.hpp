@@ -79,7 +79,7 @@ class DatasetWriter {
   std::int64_t samples_ = 0;
 };
 
-/// Checks format, shapes, finite samples, known material names, the order of /samples/trajectory.
+/// Checks format, shapes, finite samples, the order of /samples/trajectory.
 Dataset read_dataset(const std::filesystem::path& file);
 
 }  // namespace uniphy
