@@ -60,6 +60,7 @@ inline constexpr double kStressRate = 3.0;
 inline constexpr double kStrainScale = 0.05;    ///< e = kStrainScale exp(kStrainRate z1)
 inline constexpr double kStrainRate = 2.0;
 inline constexpr double kTimeScale = 0.05;      ///< s, D = sym(C) kTimeScale
+inline constexpr double kInvariantSmoothing = 0.05;  ///< d: rounds the kink of the norms at 0
 inline constexpr double kMinimumStretch = 0.05;  ///< singular values are clamped here before the log
 
 }  // namespace uniphy::kernels

@@ -76,7 +76,7 @@ UNIPHY_INLINE void order(Mat3<V>& a, Mat3<V>& v, Vec3<V>& norm2, int p, int q) {
 /// as sqrt(max) and as small as sqrt(min) without loss.
 /// G. H. Golub, C. F. Van Loan, Matrix Computations, 4th ed., section 8.6.3.
 template <class V>
-UNIPHY_INLINE Svd3<V> svd3(const Mat3<V>& F) {
+UNIPHY_NOINLINE Svd3<V> svd3(const Mat3<V>& F) {
   using T = ScalarOf<V>;
   const V one(T(1)), zero(T(0));
   V scale = lane_abs(F.e[0]);
@@ -145,7 +145,7 @@ UNIPHY_INLINE Svd3<V> svd3(const Mat3<V>& F) {
 
 /// Adjoint of the factors themselves, for the seed form of the law, which feeds U, Σ and Vᵀ to a
 /// network. The exact derivative holds 1/(σj² − σi²), which is unbounded where singular values meet
-/// and where U and V are not unique. It is replaced by d/(d² + ε²σ⁴) with ε = 1e-4 (float64) or
+/// and where U and V are not unique. It is replaced by d/(d² + ε²σ⁴) with ε = 1e-6 (float64) or
 /// 1e-3 (float32) and σ the largest singular value: exact to (ε σ²/d)² away from equal values,
 /// bounded by 1/(2εσ²), and zero at d = 0. Isotropic functions of F must not go through here; use
 /// spectral.hpp.
@@ -153,8 +153,8 @@ template <class V>
 UNIPHY_INLINE Mat3<V> svd3_adjoint(const Svd3<V>& s, const Mat3<V>& grad_U,
                                    const Vec3<V>& grad_sigma, const Mat3<V>& grad_V) {
   using T = ScalarOf<V>;
-  const V top = lane_max(s.sigma[0] * s.sigma[0], V(std::numeric_limits<T>::min() * T(1e8)));
-  const V floor = V(T(sizeof(T) == 8 ? 1e-4 : 1e-3)) * top;
+  const V top = lane_max(s.sigma[0] * s.sigma[0], V(T(1e-8)));
+  const V floor = V(T(sizeof(T) == 8 ? 1e-6 : 1e-3)) * top;
   // dU = U Ω, dV = V Ψ with Ω, Ψ antisymmetric; B = Uᵀ dF V.
   const Mat3<V> P = tmul(s.U, grad_U), Q = tmul(s.V_, grad_V);
   Mat3<V> A;

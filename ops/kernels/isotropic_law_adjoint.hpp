@@ -1,0 +1,181 @@
+#pragma once
+
+#include "ops/kernels/isotropic_law.hpp"
+
+namespace uniphy::kernels {
+inline namespace UNIPHY_ISA {
+
+/// The adjoint of isotropic_evaluate, recomputing its forward pass tile by tile. Overwrites
+/// grad_F_trial, adds to grad_C and to the accumulator (LearnedLaw::Accumulator's layout); the last
+/// two may be null.
+template <class T>
+inline void isotropic_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count,
+                              View<const T> F_trial, View<const T> C, View<const T> grad_F_proj,
+                              View<const T> grad_tau, View<T> grad_F_trial, View<T> grad_C,
+                              T* accumulator, T* scratch) {
+  using V = Lanes<T>;
+  using namespace isotropic_detail;
+  constexpr int w = width_of<V>;
+  const IsotropicTile<T> tile(law, scratch);
+  const T *h, *a;
+  isotropic_tile_forward<true>(law, count, F_trial, C, tile, h, a);
+  const T e = law.strain_scale;
+  const V zero(T(0)), one(T(1)), two(T(2)), third(T(1.0 / 3)), inv_e(T(1) / e);
+  const V scale(law.stress_scale);
+  V sum_log_s = zero, sum_log_e = zero, sum_rest = zero, sum_gate[2] = {zero, zero};
+
+  const auto reload = [&](std::ptrdiff_t l, Mat3<V>& U, Vec3<V>& sigma, HenckyStrain<V>& strain,
+                          Gate<V>& g, StressState<V>& s) {
+    U = load_plane3<V>(tile.U, l);
+    for (int k = 0; k < 3; ++k) sigma[k] = V::load_aligned(tile.sigma + k * kTile + l);
+    strain = hencky_strain(sigma, true);
+    g = gate<V, T>(strain, gate_height<V>(law, h, 0, l), gate_height<V>(law, h, 1, l), e);
+    s = stress_state<V, T>(U, projected_sigma<V, T>(g, sigma),
+                           load_mat3<V, T>(C, l, count - l, false), e, true);
+  };
+
+  // The stress network's outputs. Lanes beyond count read zero gradients and add nothing.
+  for (std::ptrdiff_t l = 0; l < kTile; l += w) {
+    Mat3<V> U;
+    Vec3<V> sigma;
+    HenckyStrain<V> strain;
+    Gate<V> g;
+    StressState<V> s;
+    reload(l, U, sigma, strain, g, s);
+    V c[4];
+    load_coefficients<V>(law, a, l, c);
+    const Mat3<V> gt = sym(load_mat3<V, T>(grad_tau, l, count - l, false)) * scale;
+    const Mat3<V> S = tmul(U, mul(gt, U));
+    V g0 = zero, g1 = zero, g2 = zero;
+    for (int i = 0; i < 3; ++i) {
+      g0 = g0 + S(i, i);
+      g1 = fma(S(i, i), s.invariants.w[i], g1);
+      g2 = fma(S(i, i), s.second[i], g2);
+    }
+    const V g3 = dot(gt, s.rate);
+    store_plane(tile.grad_stress, l, g0);
+    store_plane(tile.grad_stress + kTile, l, g1);
+    store_plane(tile.grad_stress + 2 * kTile, l, g2);
+    store_plane(tile.grad_stress + 3 * kTile, l, g3);
+    sum_rest = sum_rest + g0;
+    sum_log_s = sum_log_s + g0 * c[0] + g1 * c[1] + g2 * c[2] + g3 * c[3];
+  }
+  T* const stress_bias = accumulator ? accumulator + law.projection.layer[0].out : nullptr;
+  T* const feature = tile.grad_features;
+  mlp_backward<T>(law.stress, tile.stress_in, tile.stress_tape, tile.grad_stress, feature,
+                  stress_bias, nullptr);
+
+  // From the stress to the frame gradient of the projected F, and on to the gate.
+  for (std::ptrdiff_t l = 0; l < kTile; l += w) {
+    Mat3<V> U;
+    Vec3<V> sigma;
+    HenckyStrain<V> strain;
+    Gate<V> g;
+    StressState<V> s;
+    reload(l, U, sigma, strain, g, s);
+    const Mat3<V> Vm = load_plane3<V>(tile.V, l);
+    V c[4], f[6];
+    load_coefficients<V>(law, a, l, c);
+    for (int k = 0; k < 6; ++k) f[k] = V::load_aligned(feature + k * kTile + l);
+    const Mat3<V> gt = sym(load_mat3<V, T>(grad_tau, l, count - l, false)) * scale;
+    const Mat3<V> S = tmul(U, mul(gt, U));
+    const StrainInvariants<V>& v = s.invariants;
+
+    // x = aligned / (1 + n q)
+    const V inv_x = one / fma(s.rate_norm, v.q, one);
+    const V g_aligned = f[5] * inv_x;
+    const V g_rate_norm = f[4] - f[5] * s.x * v.q * inv_x;
+    V g_q = f[1] - f[5] * s.x * s.rate_norm * inv_x;
+
+    // The diagonal: d_i = a₀ + a₁ w_i + a₂ second_i, and the invariants of w.
+    const V mean_S = (S(0, 0) + S(1, 1) + S(2, 2)) * third;
+    for (int i = 0; i < 3; ++i) g_q = g_q - S(i, i) * c[2] * s.second[i] * s.spread;
+    const V slope2 = two * c[2] * s.spread;
+    Vec3<V> gd;
+    V ge = -(f[0] * s.h.trace * inv_e);  // dL/d(log e)
+    for (int i = 0; i < 3; ++i) {
+      V gw = fma(c[1], S(i, i), slope2 * v.w[i] * (S(i, i) - mean_S));
+      gw = gw + g_aligned * s.rate_frame(i, i) + g_q * v.w[i] * v.inverse_root + f[2] * v.d_cubic[i];
+      ge = ge - gw * v.w[i];
+      gd[i] = gw * inv_e;
+    }
+
+    Mat3<V> G;  // dL/d(U ε̂ Uᵀ) off the diagonal
+    for (int k = 0; k < 3; ++k) {
+      const int i = kPair[k][0], j = kPair[k][1];
+      const V t = S(i, j) * (c[1] + c[2] * (v.w[i] + v.w[j]) * s.spread);
+      G(i, j) = G(j, i) = fma(g_aligned, s.rate_frame(i, j), t) * inv_e;
+    }
+    Mat3<V> A = tmul(U, mul(load_mat3<V, T>(grad_F_proj, l, count - l, false), Vm));
+    const Vec3<V> sigma_p = projected_sigma<V, T>(g, sigma);
+    add_strain_gradient(s.h, gd, f[0] * inv_e, A);
+    add_symmetric_adjoint(sigma_p, s.h.divided, G, A);
+
+    if (grad_C) {
+      Mat3<V> gD = compose(U, v.w, U) * g_aligned + gt * c[3] +
+                   s.rate * (g_rate_norm * s.inverse_rate_root);
+      const V mean = trace(gD) * third;
+      for (int k = 0; k < 9; k += 4) gD.e[k] = gD.e[k] - mean + f[3];
+      store_mat3<V, T>(grad_C, l, count - l, gD * V(T(kTimeScale)), true);
+    }
+
+    // Through the gate, where it is open.
+    V g_scale, g_trace;
+    Vec3<V> g_dev;
+    const Mat3<V> B = log_map_adjoint(strain, sigma, g.map, A, g_scale, g_trace, g_dev);
+    const V strain_inv_q = safe_inverse(strain.norm);
+    const auto survives = strain.norm > g.decrease_q;
+    const V g_qp = select<V>(survives, g_scale * strain_inv_q, zero);  // dL/dq'
+    // scale = q'/q with q' = q − r₁
+    const V g_norm = g_qp - g_scale * g.map.scale * strain_inv_q;
+    for (int i = 0; i < 3; ++i) {
+      g_dev[i] = select<V>(g.yields, fma(g_norm * strain_inv_q, strain.deviator[i], g_dev[i]), zero);
+      g_trace = select<V>(g.yields, g_trace, zero);
+    }
+    Mat3<V> D = select3(g.yields, B, A);
+    add_strain_gradient(strain, g_dev, g_trace, D);
+    const V h1 = gate_height<V>(law, h, 0, l), h2 = gate_height<V>(law, h, 1, l);
+    const V g_h1 = select<V>(h1 > zero, -g_qp, zero), g_h2 = select<V>(h2 > zero, -g_trace, zero);
+    store_plane(tile.grad_projection, l, g_h1 * V(e));
+    store_plane(tile.grad_projection + kTile, l, g_h2 * V(e));
+    sum_gate[0] = sum_gate[0] + g_h1 * V(e);
+    sum_gate[1] = sum_gate[1] + g_h2 * V(e);
+    sum_log_e = sum_log_e + ge + (g_h1 * h1 + g_h2 * h2) * V(e);
+    for (int k = 0; k < 9; ++k) store_plane(tile.frame + k * kTile, l, D.e[k]);
+  }
+
+  T* const invariant = tile.grad_invariants;
+  mlp_backward<T>(law.projection, tile.projection_in, tile.projection_tape, tile.grad_projection,
+                  invariant, accumulator, nullptr);
+  for (std::ptrdiff_t l = 0; l < kTile; l += w) {
+    const Mat3<V> U = load_plane3<V>(tile.U, l), Vm = load_plane3<V>(tile.V, l);
+    Vec3<V> sigma;
+    for (int k = 0; k < 3; ++k) sigma[k] = V::load_aligned(tile.sigma + k * kTile + l);
+    const HenckyStrain<V> strain = hencky_strain(sigma, true);
+    const StrainInvariants<V> v = strain_invariants(strain, inv_e);
+    const V gt = V::load_aligned(invariant + l);
+    const V gq = V::load_aligned(invariant + kTile + l);
+    const V gl = V::load_aligned(invariant + 2 * kTile + l);
+    sum_log_e = sum_log_e - gt * strain.trace * inv_e;
+    Vec3<V> gd;
+    for (int i = 0; i < 3; ++i) {
+      const V gw = fma(gl, v.d_cubic[i], gq * v.w[i] * v.inverse_root);
+      sum_log_e = sum_log_e - gw * v.w[i];
+      gd[i] = gw * inv_e;
+    }
+    Mat3<V> D = load_plane3<V>(tile.frame, l);
+    add_strain_gradient(strain, gd, gt * inv_e, D);
+    if (grad_F_trial && l < count)
+      store_mat3<V, T>(grad_F_trial, l, count - l, mult(mul(U, D), Vm));
+  }
+  if (accumulator) {
+    T* tail = accumulator + law.projection.layer[0].out + law.stress.layer[0].out;
+    tail[0] += lane_sum(sum_log_s);
+    tail[1] += lane_sum(sum_log_e);
+    tail[2] -= lane_sum(sum_rest);
+    for (int k = 0; k < 2; ++k) tail[3 + k] -= lane_sum(sum_gate[k]);
+  }
+}
+
+}  // namespace UNIPHY_ISA
+}  // namespace uniphy::kernels

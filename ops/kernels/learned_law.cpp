@@ -1,0 +1,175 @@
+#include "ops/kernels/learned_law.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <new>
+#include <string>
+
+#include "ops/kernels/error.hpp"
+#include "ops/kernels/isa.hpp"
+
+namespace uniphy::kernels {
+
+// Defined by learned_law_isa_entry.cpp, once for each instruction set.
+inline namespace isa_baseline {
+template <class T>
+const LearnedLawTable<T>& learned_law_isa_table();
+}
+#if defined(UNIPHY_HAVE_X86_ISA)
+namespace isa_avx2 {
+template <class T>
+const LearnedLawTable<T>& learned_law_isa_table();
+}
+namespace isa_avx512 {
+template <class T>
+const LearnedLawTable<T>& learned_law_isa_table();
+}
+#endif
+
+template <class T>
+const LearnedLawTable<T>& learned_law_table() {
+#if defined(UNIPHY_HAVE_X86_ISA)
+  switch (active_isa()) {
+    case Isa::avx512:
+      return isa_avx512::learned_law_isa_table<T>();
+    case Isa::avx2:
+      return isa_avx2::learned_law_isa_table<T>();
+    case Isa::baseline:
+      break;
+  }
+#endif
+  return isa_baseline::learned_law_isa_table<T>();
+}
+template const LearnedLawTable<float>& learned_law_table<float>();
+template const LearnedLawTable<double>& learned_law_table<double>();
+
+namespace {
+
+/// Grows to the largest request of its thread and stays: the kernels' scratch.
+template <class T>
+T* scratch_of_thread(std::ptrdiff_t size) {
+  struct Buffer {
+    T* data = nullptr;
+    std::ptrdiff_t size = 0;
+    ~Buffer() { ::operator delete(data, std::align_val_t(64)); }
+  };
+  thread_local Buffer buffer;
+  if (buffer.size < size) {
+    ::operator delete(buffer.data, std::align_val_t(64));
+    buffer.data = nullptr;
+    buffer.size = 0;
+    buffer.data =
+        static_cast<T*>(::operator new(std::size_t(size) * sizeof(T), std::align_val_t(64)));
+    buffer.size = size;
+    std::fill_n(buffer.data, size, T(0));
+  }
+  return buffer.data;
+}
+
+template <class T>
+class LearnedLawKernel final : public LawKernel<T> {
+ public:
+  explicit LearnedLawKernel(const LawDescription& d)
+      : latent_size_(d.weights->latent_size),
+        table_(learned_law_table<T>()),
+        projection_(d.weights->projection, d.weights->activation, d.z),
+        stress_(d.weights->stress, d.weights->activation, d.z) {
+    const double z0 = latent_size_ > 0 ? d.z[0] : 0, z1 = latent_size_ > 1 ? d.z[1] : 0;
+    law_ = {d.weights->form,
+            projection_.mlp(),
+            stress_.mlp(),
+            T(kStressScale * std::exp(kStressRate * z0)),
+            T(kStrainScale * std::exp(kStrainRate * z1)),
+            T(0),
+            {T(0), T(0)}};
+    if (law_.form == LawForm::isotropic) {
+      law_.rest_pressure = at_rest(law_.stress, 0);
+      for (int k = 0; k < 2; ++k)
+        law_.rest_gate[k] = std::max(at_rest(law_.projection, k), T(0));
+    }
+  }
+
+  std::ptrdiff_t parameter_size() const override { return latent_size_; }
+  std::ptrdiff_t accumulator_size() const override { return law_.accumulator_size(); }
+
+  void parameter_gradient(const T* accumulator, T* gradient) const override {
+    const int projection_width = law_.projection.layer[0].out;
+    const int stress_width = law_.stress.layer[0].out;
+    const T* tail = accumulator + projection_width + stress_width;
+    std::vector<double> z(latent_size_, 0.0);
+    projection_.add_latent_gradient(accumulator, z);
+    stress_.add_latent_gradient(accumulator + projection_width, z);
+    if (law_.form == LawForm::isotropic) {
+      std::vector<T> bias(stress_width, T(0));
+      at_rest(law_.stress, 0, tail[2], bias.data());
+      stress_.add_latent_gradient(bias.data(), z);
+      bias.assign(projection_width, T(0));
+      for (int k = 0; k < 2; ++k)
+        if (law_.rest_gate[k] > 0) at_rest(law_.projection, k, tail[3 + k], bias.data());
+      projection_.add_latent_gradient(bias.data(), z);
+      if (latent_size_ > 1) z[1] += kStrainRate * double(tail[1]);
+    }
+    if (latent_size_ > 0) z[0] += kStressRate * double(tail[0]);
+    std::copy(z.begin(), z.end(), gradient);
+  }
+
+  void evaluate(std::ptrdiff_t count, T, View<const T> F_trial, View<const T> C, View<T> F_proj,
+                View<T> tau) const override {
+    T* scratch = scratch_of_thread<T>(table_.scratch(law_));
+    for (std::ptrdiff_t p = 0; p < count; p += kTile)
+      table_.evaluate(law_, std::min(kTile, count - p), F_trial.from(p), C.from(p), F_proj.from(p),
+                      tau.from(p), scratch);
+  }
+
+  void adjoint(std::ptrdiff_t count, T, View<const T> F_trial, View<const T> C,
+               View<const T> grad_F_proj, View<const T> grad_tau, View<T> grad_F_trial,
+               View<T> grad_C, T* accumulator) const override {
+    T* scratch = scratch_of_thread<T>(table_.scratch(law_));
+    for (std::ptrdiff_t p = 0; p < count; p += kTile)
+      table_.adjoint(law_, std::min(kTile, count - p), F_trial.from(p), C.from(p),
+                     grad_F_proj.from(p), grad_tau.from(p), grad_F_trial.from(p), grad_C.from(p),
+                     accumulator, scratch);
+  }
+
+ private:
+  /// Output `row` of a network at rest, from the very kernel that the roll-out uses, so that what is
+  /// taken off is exact there. With `bias`, its gradient with respect to the folded first bias is
+  /// added, times `weight`.
+  T at_rest(const PackedMlp<T>& net, int row, T weight = T(0), T* bias = nullptr) const {
+    const std::ptrdiff_t plane = std::ptrdiff_t(net.max_width) * kTile;
+    T* scratch = scratch_of_thread<T>(net.tape_scratch() + 3 * plane);
+    T *in = scratch, *out = in + plane, *grad = out + plane, *tape = grad + plane;
+    std::fill_n(in, 3 * plane, T(0));
+    table_.mlp_forward(net, in, out, tape);
+    if (bias) {
+      grad[row * kTile] = weight;  // one particle of the tile
+      table_.mlp_backward(net, in, tape, grad, nullptr, bias, nullptr);
+    }
+    return out[row * kTile];
+  }
+
+  std::ptrdiff_t latent_size_;
+  const LearnedLawTable<T>& table_;
+  PackedMlpStorage<T> projection_, stress_;
+  LearnedLaw<T> law_{};
+};
+
+}  // namespace
+
+template <class T>
+std::shared_ptr<const LawKernel<T>> make_learned_law(const LawDescription& description) {
+  if (!description.weights) throw Error("law learned: expected a trained model, found none");
+  description.weights->check();
+  const std::size_t expected = std::size_t(description.weights->latent_size);
+  if (description.z.size() != expected)
+    throw Error("law learned: expected a latent of " + std::to_string(expected) +
+                " numbers, found " + std::to_string(description.z.size()));
+  for (const double z : description.z)
+    if (!std::isfinite(z)) throw Error("law learned: expected a finite latent, found " +
+                                       std::to_string(z));
+  return std::make_shared<LearnedLawKernel<T>>(description);
+}
+template std::shared_ptr<const LawKernel<float>> make_learned_law(const LawDescription&);
+template std::shared_ptr<const LawKernel<double>> make_learned_law(const LawDescription&);
+
+}  // namespace uniphy::kernels

@@ -1,0 +1,60 @@
+#pragma once
+
+#include "ops/kernels/packed_mlp.hpp"
+#include "ops/kernels/view.hpp"
+
+namespace uniphy::kernels {
+
+/// A learned law with one latent folded in, as the kernels read it. All pointers are borrowed.
+template <class T>
+struct LearnedLaw {
+  LawForm form;
+  PackedMlp<T> projection;
+  PackedMlp<T> stress;
+  T stress_scale;   ///< s, Pa
+  T strain_scale;   ///< e
+  // Isotropic form: the networks' own answers at F = I, C = 0, which are taken off so that rest is
+  // a state without yield and without stress.
+  T rest_pressure;  ///< a₀, in units of s
+  T rest_gate[2];   ///< max(g_φ, 0)
+
+  /// Layout of the running sum of an adjoint: gradients of the two folded first biases, then
+  /// dL/d(log s), dL/d(log e), dL/d(rest_pressure), dL/d(rest_gate).
+  std::ptrdiff_t accumulator_size() const {
+    return projection.layer[0].out + stress.layer[0].out + 5;
+  }
+};
+
+/// Where the sums of weight gradients of one layer go: [out, in, lanes] and [out, lanes].
+template <class T>
+struct WeightGradient {
+  T* weight;
+  T* bias;
+};
+
+/// The learned law's inner loops on one instruction set.
+template <class T>
+struct LearnedLawTable {
+  int lanes;  ///< particles a vector
+  /// Scratch numbers of evaluate and adjoint.
+  std::ptrdiff_t (*scratch)(const LearnedLaw<T>&);
+  /// LawKernel::evaluate of at most kTile particles.
+  void (*evaluate)(const LearnedLaw<T>&, std::ptrdiff_t count, View<const T> F_trial,
+                   View<const T> C, View<T> F_proj, View<T> tau, T* scratch);
+  /// LawKernel::adjoint of at most kTile particles; grad_F_proj and grad_tau must be given.
+  void (*adjoint)(const LearnedLaw<T>&, std::ptrdiff_t count, View<const T> F_trial,
+                  View<const T> C, View<const T> grad_F_proj, View<const T> grad_tau,
+                  View<T> grad_F_trial, View<T> grad_C, T* accumulator, T* scratch);
+  /// A bare network on one tile of planes: in [padded(in), kTile] → out [padded(out), kTile].
+  /// scratch: tape_scratch() numbers, which then hold the tape.
+  void (*mlp_forward)(const PackedMlp<T>&, const T* in, T* out, T* scratch);
+  /// The adjoint of the mlp_forward that filled `tape`; grad_in, first_bias, weights may be null.
+  void (*mlp_backward)(const PackedMlp<T>&, const T* in, T* tape, const T* grad_out, T* grad_in,
+                       T* first_bias, const WeightGradient<T>* weights);
+};
+
+/// The table of the active instruction set (isa.hpp).
+template <class T>
+const LearnedLawTable<T>& learned_law_table();
+
+}  // namespace uniphy::kernels
