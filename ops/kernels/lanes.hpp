@@ -10,7 +10,13 @@
 #include <cmath>
 #include <cstddef>
 #include <type_traits>
+
+// GCC 12 takes the deliberately undefined operands of its AVX-512 intrinsics for a mistake.
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
+#pragma GCC diagnostic ignored "-Wuninitialized"
 #include <xsimd/xsimd.hpp>
+#pragma GCC diagnostic pop
 
 #include "ops/kernels/view.hpp"
 
@@ -23,6 +29,8 @@
 #endif
 
 #define UNIPHY_INLINE inline __attribute__((always_inline))
+// For code that is large or rarely run: one copy, so that the hot loops stay small.
+#define UNIPHY_NOINLINE __attribute__((noinline))
 
 namespace uniphy::kernels {
 inline namespace UNIPHY_ISA {
@@ -113,6 +121,25 @@ template <class V> UNIPHY_INLINE ScalarOf<V> lane_sum(const V& a) {
 template <class V> UNIPHY_INLINE V cbrt_positive(const V& a) { return lane_exp(lane_log(a) * V(ScalarOf<V>(1.0 / 3.0))); }
 // clang-format on
 
+/// buffer[l] = at[l * stride] for the first min(count, width) lanes, `fill` beyond.
+template <int width, class T>
+UNIPHY_NOINLINE void gather_strided(const T* at, std::ptrdiff_t stride, std::ptrdiff_t count,
+                                    T fill, T* buffer) {
+  if (count >= width) {
+    for (int l = 0; l < width; ++l) buffer[l] = at[l * stride];
+  } else {
+    for (int l = 0; l < width; ++l) buffer[l] = l < count ? at[l * stride] : fill;
+  }
+}
+template <int width, class T>
+UNIPHY_NOINLINE void scatter_strided(T* at, std::ptrdiff_t stride, std::ptrdiff_t count,
+                                     const T* buffer, bool accumulate) {
+  const std::ptrdiff_t n = count < width ? count : width;
+  for (std::ptrdiff_t l = 0; l < n; ++l) {
+    at[l * stride] = accumulate ? at[l * stride] + buffer[l] : buffer[l];
+  }
+}
+
 /// Lanes p, p+1, ... of one component; lanes at and beyond `count` take `fill`.
 template <class V, class T>
 UNIPHY_INLINE V load_lanes(const View<const T>& view, std::ptrdiff_t p, std::ptrdiff_t k,
@@ -124,7 +151,7 @@ UNIPHY_INLINE V load_lanes(const View<const T>& view, std::ptrdiff_t p, std::ptr
     const T* at = view.data + p * view.particle_stride + k * view.component_stride;
     if (count >= w && view.particle_stride == 1) return V::load_unaligned(at);
     alignas(64) T buffer[w];
-    for (int l = 0; l < w; ++l) buffer[l] = l < count ? at[l * view.particle_stride] : fill;
+    gather_strided<w>(at, view.particle_stride, count, fill, buffer);
     return V::load_aligned(buffer);
   }
 }
@@ -144,10 +171,7 @@ UNIPHY_INLINE void store_lanes(const View<T>& view, std::ptrdiff_t p, std::ptrdi
     }
     alignas(64) T buffer[w];
     value.store_aligned(buffer);
-    for (int l = 0; l < w && l < count; ++l) {
-      T& to = at[l * view.particle_stride];
-      to = accumulate ? to + buffer[l] : buffer[l];
-    }
+    scatter_strided<w>(at, view.particle_stride, count, buffer, accumulate);
   }
 }
 
