@@ -6,18 +6,23 @@
 #include "ops/kernels/mlp.hpp"
 #include "ops/kernels/spectral.hpp"
 
-// The isotropic form of the learned law: networks that see invariants and answer with the gate of a
+// The isotropic form of the learned law: networks that see invariants and answer with the caps of a
 // return mapping and the coefficients of a tensor basis.
 //
 // With ε = log Σ, t = tr ε, ε̂ its deviator, w = ε̂/e with the strain scale e of z, and the smooth
 // invariants q ≈ ‖w‖, ℓ ≈ Σ wᵢ³/‖w‖² and n ≈ ‖D̂‖ (StrainInvariants):
-//   projection  (h₁, h₂) = e (g_φ(t/e, q, ℓ, z) − max(g_φ(rest), 0));  ‖ε̂‖' = max(‖ε̂‖ − relu h₁, 0),  t' = t − relu h₂,
-//               log Σ' = ‖ε̂‖' ε̂/‖ε̂‖ + t'/3;  F_proj = F bit for bit where h₁ ≤ 0 and h₂ ≤ 0
-//   stress      (a₀, a₁, a₂, b) = f_θ(t'/e, q, ℓ, tr D, n, x, z) of the projected F,
+//   projection  (c₁, c₂) = g_φ(t/e, q, ℓ, z);  ‖ε̂‖' = min(‖ε̂‖, e max(c₁, 0)),  t' = min(t, e c₂),
+//               log Σ' = ‖ε̂‖' ε̂/‖ε̂‖ + t'/3;  F_proj = F bit for bit below both caps
+//   stress      (k, a₀, a₁, a₂, b) = f_θ(t'/e, q, ℓ, tr D, n, x, z) of the projected F,
 //               D = sym(C) t₀,  x = (w:D̂)/(1 + n q)
-//               τ = s U [(a₀ − a₀(rest)) I + a₁ w + a₂ dev(w²)/(1 + q) + b D̂] Uᵀ
-// g_φ(rest) and a₀(rest) are the networks' own answers at F = I, C = 0, so that nothing yields or
-// moves at rest, whatever the training left. Both maps are exactly frame-indifferent. The adjoint goes by divided differences (spectral.hpp).
+//               τ = s U [(k t'/e + a₀ − a₀(rest)) I + a₁ w + a₂ dev(w²)/(1 + q) + b D] Uᵀ
+//
+// The caps are what makes the laws easy: von Mises is a constant c₁, Drucker–Prager is c₁ linear in
+// t with c₂ = 0 (its apex included: c₁ < 0 where t > 0), a fluid is c₁ < 0, an elastic body has
+// both caps out of reach. Likewise k, a₁ and b are constants for a StVK–Hencky solid and for a
+// viscous stress. c₂ has min(c₂(rest), 0) and a₀ its own answer at F = I, C = 0 taken off, so that
+// nothing yields or moves at rest, whatever the training left. Both maps are exactly
+// frame-indifferent. The adjoint goes by divided differences (spectral.hpp).
 
 namespace uniphy::kernels {
 inline namespace UNIPHY_ISA {
@@ -58,32 +63,29 @@ UNIPHY_INLINE V safe_inverse(const V& x) {
   return select<V>(positive, V(T(1)) / select<V>(positive, x, V(T(1))), V(T(0)));
 }
 
-template <class V>
-UNIPHY_INLINE V relu(const V& x) {
-  return lane_max(x, V(ScalarOf<V>(0)));
-}
-
-/// The gate's answer for one vector of particles.
+/// The gate's answer for one vector of particles, given the caps in units of e.
 template <class V>
 struct Gate {
-  V decrease_q;  ///< relu(h₁)
-  V decrease_t;  ///< relu(h₂)
+  MaskOf<V> caps_q;  ///< the deviator is cut back to e c₁ > 0
+  MaskOf<V> caps_t;
   MaskOf<V> yields;
   LogMap<V> map;
 };
 template <class V, class T>
-UNIPHY_INLINE Gate<V> gate(const HenckyStrain<V>& h, const V& h1, const V& h2, T strain_scale) {
+UNIPHY_INLINE Gate<V> gate(const HenckyStrain<V>& h, const V& c1, const V& c2, T strain_scale) {
   const V zero(T(0)), one(T(1)), e(strain_scale);
   Gate<V> g;
-  g.decrease_q = relu<V>(e * h1);
-  g.decrease_t = relu<V>(e * h2);
-  g.yields = g.decrease_q > zero || g.decrease_t > zero;
-  const V q = lane_max(h.norm - g.decrease_q, zero);
-  // At q = 0 there is no deviator to scale, but its derivative is: the limit from q > 0.
+  const V cap_q = e * lane_max(c1, zero), cap_t = e * c2;
+  // c₁ ≤ 0 yields even at ‖ε̂‖ = 0, where only the derivative can tell.
+  const MaskOf<V> over = h.norm > cap_q || c1 <= zero;
+  g.caps_q = over && c1 > zero;
+  g.caps_t = h.trace > cap_t;
+  g.yields = over || g.caps_t;
+  const V q = select<V>(over, cap_q, h.norm);
   const auto deviates = h.norm > V(std::numeric_limits<T>::min());
-  const V limit = select<V>(g.decrease_q > zero, zero, one);
-  const V scale = select<V>(deviates, q / select<V>(deviates, h.norm, one), limit);
-  g.map = log_map(h, scale, h.trace - g.decrease_t);
+  const V scale =
+      select<V>(over, select<V>(deviates, q / select<V>(deviates, h.norm, one), zero), one);
+  g.map = log_map(h, scale, select<V>(g.caps_t, cap_t, h.trace));
   return g;
 }
 
@@ -99,6 +101,7 @@ template <class V>
 struct StressState {
   HenckyStrain<V> h;
   StrainInvariants<V> invariants;
+  V volumetric;        ///< t'/e
   Mat3<V> rate;        ///< D̂ (world frame)
   Mat3<V> rate_frame;  ///< Uᵀ D̂ U
   V rate_trace;
@@ -116,6 +119,7 @@ UNIPHY_INLINE StressState<V> stress_state(const Mat3<V>& U, const Vec3<V>& sigma
   StressState<V> s;
   s.h = hencky_strain(sigma, gradients);
   s.invariants = strain_invariants(s.h, inv_e);
+  s.volumetric = s.h.trace * inv_e;
   s.rate = sym(C) * V(T(kTimeScale));
   s.rate_trace = trace(s.rate);
   for (int k = 0; k < 9; k += 4) s.rate.e[k] = s.rate.e[k] - s.rate_trace * third;
@@ -135,12 +139,21 @@ UNIPHY_INLINE StressState<V> stress_state(const Mat3<V>& U, const Vec3<V>& sigma
   return s;
 }
 
-/// U diag(stress) Uᵀ + b D̂, in units of s.
+/// The coefficients of the tensor basis.
 template <class V>
-UNIPHY_INLINE Mat3<V> basis_stress(const StressState<V>& s, const Mat3<V>& U, const V a[4]) {
+struct Coefficients {
+  V k, a0, a1, a2, b;
+};
+
+/// The stress in units of s.
+template <class V>
+UNIPHY_INLINE Mat3<V> basis_stress(const StressState<V>& s, const Mat3<V>& U,
+                                   const Coefficients<V>& c) {
+  using T = ScalarOf<V>;
+  const V pressure = fma(c.k, s.volumetric, fma(c.b * s.rate_trace, V(T(1.0 / 3)), c.a0));
   Vec3<V> d;
-  for (int i = 0; i < 3; ++i) d[i] = fma(a[1], s.invariants.w[i], fma(a[2], s.second[i], a[0]));
-  return compose(U, d, U) + s.rate * a[3];
+  for (int i = 0; i < 3; ++i) d[i] = fma(c.a1, s.invariants.w[i], fma(c.a2, s.second[i], pressure));
+  return compose(U, d, U) + s.rate * c.b;
 }
 
 }  // namespace isotropic_detail
@@ -148,15 +161,14 @@ UNIPHY_INLINE Mat3<V> basis_stress(const StressState<V>& s, const Mat3<V>& U, co
 /// Scratch numbers of isotropic_evaluate and isotropic_adjoint for one tile.
 template <class T>
 std::ptrdiff_t isotropic_scratch(const LearnedLaw<T>& law) {
-  return law.projection.tape_scratch() + law.stress.tape_scratch() + kTile * 64;
+  return law.projection.tape_scratch() + law.stress.tape_scratch() + kTile * 72;
 }
 
 /// The forward tile: spectral factors and gate inputs are left in `tile` for the adjoint.
 template <class T>
 struct IsotropicTile {
   T *projection_in, *stress_in, *projection_tape, *stress_tape;
-  T *U, *sigma, *V, *grad_projection, *grad_invariants,
-      *grad_stress, *grad_features, *frame;
+  T *U, *sigma, *V, *grad_projection, *grad_invariants, *grad_stress, *grad_features, *frame;
   explicit IsotropicTile(const LearnedLaw<T>& law, T* scratch) {
     T* at = scratch;
     const auto take = [&at](std::ptrdiff_t n) {
@@ -171,7 +183,7 @@ struct IsotropicTile {
     stress_in = take(8 * kTile);
     grad_projection = take(4 * kTile);
     grad_invariants = take(4 * kTile);
-    grad_stress = take(4 * kTile);
+    grad_stress = take(8 * kTile);
     grad_features = take(8 * kTile);
     frame = take(9 * kTile);
     projection_tape = take(law.projection.tape_scratch());
@@ -179,10 +191,14 @@ struct IsotropicTile {
   }
 };
 
-/// h_{1+k} in units of e.
+/// The caps c₁ and c₂ of one vector of particles.
 template <class V, class T>
-UNIPHY_INLINE V gate_height(const LearnedLaw<T>& law, const T* h, int k, std::ptrdiff_t l) {
-  return V::load_aligned(h + k * kTile + l) - V(law.rest_gate[k]);
+UNIPHY_INLINE V cap_q(const T* c, std::ptrdiff_t l) {
+  return V::load_aligned(c + l);
+}
+template <class V, class T>
+UNIPHY_INLINE V cap_t(const LearnedLaw<T>& law, const T* c, std::ptrdiff_t l) {
+  return V::load_aligned(c + kTile + l) - V(law.rest_cap);
 }
 
 template <class V, class T>
@@ -224,11 +240,11 @@ inline void isotropic_tile_forward(const LearnedLaw<T>& law, std::ptrdiff_t coun
     Vec3<V> sigma;
     for (int k = 0; k < 3; ++k) sigma[k] = V::load_aligned(tile.sigma + k * kTile + l);
     const Mat3<V> U = load_plane3<V>(tile.U, l);
-    const Gate<V> g = gate<V, T>(hencky_strain(sigma, false), gate_height<V>(law, h, 0, l),
-                                 gate_height<V>(law, h, 1, l), e);
+    const Gate<V> g =
+        gate<V, T>(hencky_strain(sigma, false), cap_q<V>(h, l), cap_t<V>(law, h, l), e);
     const StressState<V> s = stress_state<V, T>(U, projected_sigma<V, T>(g, sigma),
                                                 load_mat3<V, T>(C, l, count - l, false), e, false);
-    store_plane(tile.stress_in, l, s.h.trace * inv_e);
+    store_plane(tile.stress_in, l, s.volumetric);
     store_plane(tile.stress_in + kTile, l, s.invariants.q);
     store_plane(tile.stress_in + 2 * kTile, l, s.invariants.cubic);
     store_plane(tile.stress_in + 3 * kTile, l, s.rate_trace);
@@ -240,10 +256,11 @@ inline void isotropic_tile_forward(const LearnedLaw<T>& law, std::ptrdiff_t coun
 }
 
 template <class V, class T>
-UNIPHY_INLINE void load_coefficients(const LearnedLaw<T>& law, const T* a, std::ptrdiff_t l,
-                                     V out[4]) {
-  for (int k = 0; k < 4; ++k) out[k] = V::load_aligned(a + k * kTile + l);
-  out[0] = out[0] - V(law.rest_pressure);
+UNIPHY_INLINE isotropic_detail::Coefficients<V> load_coefficients(const LearnedLaw<T>& law,
+                                                                  const T* a, std::ptrdiff_t l) {
+  return {V::load_aligned(a + l), V::load_aligned(a + kTile + l) - V(law.rest_pressure),
+          V::load_aligned(a + 2 * kTile + l), V::load_aligned(a + 3 * kTile + l),
+          V::load_aligned(a + 4 * kTile + l)};
 }
 
 /// F_trial, C → F_proj, tau for count ≤ kTile particles.
@@ -262,16 +279,15 @@ inline void isotropic_evaluate(const LearnedLaw<T>& law, std::ptrdiff_t count,
     Vec3<V> sigma;
     for (int k = 0; k < 3; ++k) sigma[k] = V::load_aligned(tile.sigma + k * kTile + l);
     const Mat3<V> U = load_plane3<V>(tile.U, l), Vm = load_plane3<V>(tile.V, l);
-    const Gate<V> g = gate<V, T>(hencky_strain(sigma, false), gate_height<V>(law, h, 0, l),
-                                 gate_height<V>(law, h, 1, l), e);
+    const Gate<V> g =
+        gate<V, T>(hencky_strain(sigma, false), cap_q<V>(h, l), cap_t<V>(law, h, l), e);
     const StressState<V> s = stress_state<V, T>(U, projected_sigma<V, T>(g, sigma),
                                                 load_mat3<V, T>(C, l, count - l, false), e, false);
     if (F_proj)
       store_mat3<V, T>(F_proj, l, count - l, select3(g.yields, compose(U, g.map.sigma, Vm), F));
-    V coefficient[4];
-    load_coefficients<V>(law, a, l, coefficient);
     if (tau)
-      store_mat3<V, T>(tau, l, count - l, basis_stress(s, U, coefficient) * V(law.stress_scale));
+      store_mat3<V, T>(tau, l, count - l,
+                       basis_stress(s, U, load_coefficients<V>(law, a, l)) * V(law.stress_scale));
   }
 }
 

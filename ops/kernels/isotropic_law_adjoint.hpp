@@ -9,10 +9,9 @@ inline namespace UNIPHY_ISA {
 /// grad_F_trial, adds to grad_C and to the accumulator (LearnedLaw::Accumulator's layout); the last
 /// two may be null.
 template <class T>
-inline void isotropic_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count,
-                              View<const T> F_trial, View<const T> C, View<const T> grad_F_proj,
-                              View<const T> grad_tau, View<T> grad_F_trial, View<T> grad_C,
-                              T* accumulator, T* scratch) {
+inline void isotropic_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, View<const T> F_trial,
+                              View<const T> C, View<const T> grad_F_proj, View<const T> grad_tau,
+                              View<T> grad_F_trial, View<T> grad_C, T* accumulator, T* scratch) {
   using V = Lanes<T>;
   using namespace isotropic_detail;
   constexpr int w = width_of<V>;
@@ -22,14 +21,14 @@ inline void isotropic_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count,
   const T e = law.strain_scale;
   const V zero(T(0)), one(T(1)), two(T(2)), third(T(1.0 / 3)), inv_e(T(1) / e);
   const V scale(law.stress_scale);
-  V sum_log_s = zero, sum_log_e = zero, sum_rest = zero, sum_gate[2] = {zero, zero};
+  V sum_log_s = zero, sum_log_e = zero, sum_rest = zero, sum_cap = zero;
 
   const auto reload = [&](std::ptrdiff_t l, Mat3<V>& U, Vec3<V>& sigma, HenckyStrain<V>& strain,
                           Gate<V>& g, StressState<V>& s) {
     U = load_plane3<V>(tile.U, l);
     for (int k = 0; k < 3; ++k) sigma[k] = V::load_aligned(tile.sigma + k * kTile + l);
     strain = hencky_strain(sigma, true);
-    g = gate<V, T>(strain, gate_height<V>(law, h, 0, l), gate_height<V>(law, h, 1, l), e);
+    g = gate<V, T>(strain, cap_q<V>(h, l), cap_t<V>(law, h, l), e);
     s = stress_state<V, T>(U, projected_sigma<V, T>(g, sigma),
                            load_mat3<V, T>(C, l, count - l, false), e, true);
   };
@@ -42,23 +41,24 @@ inline void isotropic_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count,
     Gate<V> g;
     StressState<V> s;
     reload(l, U, sigma, strain, g, s);
-    V c[4];
-    load_coefficients<V>(law, a, l, c);
+    const Coefficients<V> c = load_coefficients<V>(law, a, l);
     const Mat3<V> gt = sym(load_mat3<V, T>(grad_tau, l, count - l, false)) * scale;
     const Mat3<V> S = tmul(U, mul(gt, U));
-    V g0 = zero, g1 = zero, g2 = zero;
+    V g_a0 = zero, g_a1 = zero, g_a2 = zero;
     for (int i = 0; i < 3; ++i) {
-      g0 = g0 + S(i, i);
-      g1 = fma(S(i, i), s.invariants.w[i], g1);
-      g2 = fma(S(i, i), s.second[i], g2);
+      g_a0 = g_a0 + S(i, i);
+      g_a1 = fma(S(i, i), s.invariants.w[i], g_a1);
+      g_a2 = fma(S(i, i), s.second[i], g_a2);
     }
-    const V g3 = dot(gt, s.rate);
-    store_plane(tile.grad_stress, l, g0);
-    store_plane(tile.grad_stress + kTile, l, g1);
-    store_plane(tile.grad_stress + 2 * kTile, l, g2);
-    store_plane(tile.grad_stress + 3 * kTile, l, g3);
-    sum_rest = sum_rest + g0;
-    sum_log_s = sum_log_s + g0 * c[0] + g1 * c[1] + g2 * c[2] + g3 * c[3];
+    const V g_k = g_a0 * s.volumetric;
+    const V g_b = dot(gt, s.rate) + g_a0 * s.rate_trace * third;
+    store_plane(tile.grad_stress, l, g_k);
+    store_plane(tile.grad_stress + kTile, l, g_a0);
+    store_plane(tile.grad_stress + 2 * kTile, l, g_a1);
+    store_plane(tile.grad_stress + 3 * kTile, l, g_a2);
+    store_plane(tile.grad_stress + 4 * kTile, l, g_b);
+    sum_rest = sum_rest + g_a0;
+    sum_log_s = sum_log_s + g_k * c.k + g_a0 * c.a0 + g_a1 * c.a1 + g_a2 * c.a2 + g_b * c.b;
   }
   T* const stress_bias = accumulator ? accumulator + law.projection.layer[0].out : nullptr;
   T* const feature = tile.grad_features;
@@ -74,8 +74,8 @@ inline void isotropic_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count,
     StressState<V> s;
     reload(l, U, sigma, strain, g, s);
     const Mat3<V> Vm = load_plane3<V>(tile.V, l);
-    V c[4], f[6];
-    load_coefficients<V>(law, a, l, c);
+    const Coefficients<V> c = load_coefficients<V>(law, a, l);
+    V f[6];
     for (int k = 0; k < 6; ++k) f[k] = V::load_aligned(feature + k * kTile + l);
     const Mat3<V> gt = sym(load_mat3<V, T>(grad_tau, l, count - l, false)) * scale;
     const Mat3<V> S = tmul(U, mul(gt, U));
@@ -87,15 +87,17 @@ inline void isotropic_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count,
     const V g_rate_norm = f[4] - f[5] * s.x * v.q * inv_x;
     V g_q = f[1] - f[5] * s.x * s.rate_norm * inv_x;
 
-    // The diagonal: d_i = a₀ + a₁ w_i + a₂ second_i, and the invariants of w.
-    const V mean_S = (S(0, 0) + S(1, 1) + S(2, 2)) * third;
-    for (int i = 0; i < 3; ++i) g_q = g_q - S(i, i) * c[2] * s.second[i] * s.spread;
-    const V slope2 = two * c[2] * s.spread;
+    // The diagonal: d_i = k t/e + a₀ + b tr(D)/3 + a₁ w_i + a₂ second_i, and the invariants of w.
+    const V sum_S = S(0, 0) + S(1, 1) + S(2, 2), mean_S = sum_S * third;
+    const V g_volumetric = fma(sum_S, c.k, f[0]);
+    for (int i = 0; i < 3; ++i) g_q = g_q - S(i, i) * c.a2 * s.second[i] * s.spread;
+    const V slope2 = two * c.a2 * s.spread;
     Vec3<V> gd;
-    V ge = -(f[0] * s.h.trace * inv_e);  // dL/d(log e)
+    V ge = -(g_volumetric * s.volumetric);  // dL/d(log e)
     for (int i = 0; i < 3; ++i) {
-      V gw = fma(c[1], S(i, i), slope2 * v.w[i] * (S(i, i) - mean_S));
-      gw = gw + g_aligned * s.rate_frame(i, i) + g_q * v.w[i] * v.inverse_root + f[2] * v.d_cubic[i];
+      V gw = fma(c.a1, S(i, i), slope2 * v.w[i] * (S(i, i) - mean_S));
+      gw =
+          gw + g_aligned * s.rate_frame(i, i) + g_q * v.w[i] * v.inverse_root + f[2] * v.d_cubic[i];
       ge = ge - gw * v.w[i];
       gd[i] = gw * inv_e;
     }
@@ -103,19 +105,19 @@ inline void isotropic_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count,
     Mat3<V> G;  // dL/d(U ε̂ Uᵀ) off the diagonal
     for (int k = 0; k < 3; ++k) {
       const int i = kPair[k][0], j = kPair[k][1];
-      const V t = S(i, j) * (c[1] + c[2] * (v.w[i] + v.w[j]) * s.spread);
+      const V t = S(i, j) * (c.a1 + c.a2 * (v.w[i] + v.w[j]) * s.spread);
       G(i, j) = G(j, i) = fma(g_aligned, s.rate_frame(i, j), t) * inv_e;
     }
     Mat3<V> A = tmul(U, mul(load_mat3<V, T>(grad_F_proj, l, count - l, false), Vm));
     const Vec3<V> sigma_p = projected_sigma<V, T>(g, sigma);
-    add_strain_gradient(s.h, gd, f[0] * inv_e, A);
+    add_strain_gradient(s.h, gd, g_volumetric * inv_e, A);
     add_symmetric_adjoint(sigma_p, s.h.divided, G, A);
 
     if (grad_C) {
-      Mat3<V> gD = compose(U, v.w, U) * g_aligned + gt * c[3] +
-                   s.rate * (g_rate_norm * s.inverse_rate_root);
-      const V mean = trace(gD) * third;
-      for (int k = 0; k < 9; k += 4) gD.e[k] = gD.e[k] - mean + f[3];
+      Mat3<V> gD =
+          compose(U, v.w, U) * g_aligned + gt * c.b + s.rate * (g_rate_norm * s.inverse_rate_root);
+      const V mean = trace(gD) * third, g_rate_trace = fma(sum_S * third, c.b, f[3]);
+      for (int k = 0; k < 9; k += 4) gD.e[k] = gD.e[k] - mean + g_rate_trace;
       store_mat3<V, T>(grad_C, l, count - l, gD * V(T(kTimeScale)), true);
     }
 
@@ -123,24 +125,20 @@ inline void isotropic_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count,
     V g_scale, g_trace;
     Vec3<V> g_dev;
     const Mat3<V> B = log_map_adjoint(strain, sigma, g.map, A, g_scale, g_trace, g_dev);
-    const V strain_inv_q = safe_inverse(strain.norm);
-    const auto survives = strain.norm > g.decrease_q;
-    const V g_qp = select<V>(survives, g_scale * strain_inv_q, zero);  // dL/dq'
-    // scale = q'/q with q' = q − r₁
-    const V g_norm = g_qp - g_scale * g.map.scale * strain_inv_q;
-    for (int i = 0; i < 3; ++i) {
-      g_dev[i] = select<V>(g.yields, fma(g_norm * strain_inv_q, strain.deviator[i], g_dev[i]), zero);
-      g_trace = select<V>(g.yields, g_trace, zero);
-    }
+    // scale = ‖ε̂‖'/‖ε̂‖ with ‖ε̂‖' = e c₁ where capped: nothing below the cap, where it is 1.
+    const V inv_norm = safe_inverse(strain.norm), c1 = cap_q<V>(h, l), c2 = cap_t<V>(law, h, l);
+    const V g_c1 = select<V>(g.caps_q, g_scale * inv_norm * V(e), zero);
+    const V g_c2 = select<V>(g.caps_t, g_trace * V(e), zero);
+    const V g_norm = select<V>(g.caps_q, -g_scale * g.map.scale * inv_norm, zero);
+    for (int i = 0; i < 3; ++i)
+      g_dev[i] = select<V>(g.yields, fma(g_norm * inv_norm, strain.deviator[i], g_dev[i]), zero);
+    g_trace = select<V>(g.yields && !g.caps_t, g_trace, zero);
     Mat3<V> D = select3(g.yields, B, A);
     add_strain_gradient(strain, g_dev, g_trace, D);
-    const V h1 = gate_height<V>(law, h, 0, l), h2 = gate_height<V>(law, h, 1, l);
-    const V g_h1 = select<V>(h1 > zero, -g_qp, zero), g_h2 = select<V>(h2 > zero, -g_trace, zero);
-    store_plane(tile.grad_projection, l, g_h1 * V(e));
-    store_plane(tile.grad_projection + kTile, l, g_h2 * V(e));
-    sum_gate[0] = sum_gate[0] + g_h1 * V(e);
-    sum_gate[1] = sum_gate[1] + g_h2 * V(e);
-    sum_log_e = sum_log_e + ge + (g_h1 * h1 + g_h2 * h2) * V(e);
+    store_plane(tile.grad_projection, l, g_c1);
+    store_plane(tile.grad_projection + kTile, l, g_c2);
+    sum_cap = sum_cap + g_c2;
+    sum_log_e = sum_log_e + ge + g_c1 * c1 + g_c2 * c2;
     for (int k = 0; k < 9; ++k) store_plane(tile.frame + k * kTile, l, D.e[k]);
   }
 
@@ -173,7 +171,7 @@ inline void isotropic_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count,
     tail[0] += lane_sum(sum_log_s);
     tail[1] += lane_sum(sum_log_e);
     tail[2] -= lane_sum(sum_rest);
-    for (int k = 0; k < 2; ++k) tail[3 + k] -= lane_sum(sum_gate[k]);
+    tail[3] -= lane_sum(sum_cap);
   }
 }
 

@@ -81,11 +81,10 @@ class LearnedLawKernel final : public LawKernel<T> {
             T(kStressScale * std::exp(kStressRate * z0)),
             T(kStrainScale * std::exp(kStrainRate * z1)),
             T(0),
-            {T(0), T(0)}};
+            T(0)};
     if (law_.form == LawForm::isotropic) {
-      law_.rest_pressure = at_rest(law_.stress, 0);
-      for (int k = 0; k < 2; ++k)
-        law_.rest_gate[k] = std::max(at_rest(law_.projection, k), T(0));
+      law_.rest_pressure = at_rest(law_.stress, 1);
+      law_.rest_cap = std::min(at_rest(law_.projection, 1), T(0));
     }
   }
 
@@ -101,11 +100,10 @@ class LearnedLawKernel final : public LawKernel<T> {
     stress_.add_latent_gradient(accumulator + projection_width, z);
     if (law_.form == LawForm::isotropic) {
       std::vector<T> bias(stress_width, T(0));
-      at_rest(law_.stress, 0, tail[2], bias.data());
+      at_rest(law_.stress, 1, tail[2], bias.data());
       stress_.add_latent_gradient(bias.data(), z);
       bias.assign(projection_width, T(0));
-      for (int k = 0; k < 2; ++k)
-        if (law_.rest_gate[k] > 0) at_rest(law_.projection, k, tail[3 + k], bias.data());
+      if (law_.rest_cap < 0) at_rest(law_.projection, 1, tail[3], bias.data());
       projection_.add_latent_gradient(bias.data(), z);
       if (latent_size_ > 1) z[1] += kStrainRate * double(tail[1]);
     }

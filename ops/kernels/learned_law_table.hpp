@@ -11,17 +11,17 @@ struct LearnedLaw {
   LawForm form;
   PackedMlp<T> projection;
   PackedMlp<T> stress;
-  T stress_scale;   ///< s, Pa
-  T strain_scale;   ///< e
+  T stress_scale;  ///< s, Pa
+  T strain_scale;  ///< e
   // Isotropic form: the networks' own answers at F = I, C = 0, which are taken off so that rest is
   // a state without yield and without stress.
   T rest_pressure;  ///< a₀, in units of s
-  T rest_gate[2];   ///< max(g_φ, 0)
+  T rest_cap;       ///< min(c₂, 0)
 
   /// Layout of the running sum of an adjoint: gradients of the two folded first biases, then
-  /// dL/d(log s), dL/d(log e), dL/d(rest_pressure), dL/d(rest_gate).
+  /// dL/d(log s), dL/d(log e), dL/d(rest_pressure), dL/d(rest_cap).
   std::ptrdiff_t accumulator_size() const {
-    return projection.layer[0].out + stress.layer[0].out + 5;
+    return projection.layer[0].out + stress.layer[0].out + 4;
   }
 };
 

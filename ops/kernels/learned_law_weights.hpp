@@ -37,7 +37,7 @@ struct NetworkShape {
   int projection_in, projection_out, stress_in, stress_out;
 };
 constexpr NetworkShape network_shape(LawForm form) {
-  return form == LawForm::isotropic ? NetworkShape{3, 2, 6, 4} : NetworkShape{30, 9, 25, 9};
+  return form == LawForm::isotropic ? NetworkShape{3, 2, 6, 5} : NetworkShape{30, 9, 25, 9};
 }
 
 /// The learned law without torch: what a model file holds. The first layers take the features of
@@ -55,12 +55,13 @@ struct LearnedLawWeights {
 
 // The units that the networks see; spec of the isotropic form. Coordinates 0 and 1 of z carry a
 // stress scale and a strain scale, so that one network serves soft and stiff materials alike.
-inline constexpr double kStressScale = 1e4;     ///< Pa, s = kStressScale exp(kStressRate z0)
+inline constexpr double kStressScale = 1e4;  ///< Pa, s = kStressScale exp(kStressRate z0)
 inline constexpr double kStressRate = 3.0;
-inline constexpr double kStrainScale = 0.05;    ///< e = kStrainScale exp(kStrainRate z1)
+inline constexpr double kStrainScale = 0.05;  ///< e = kStrainScale exp(kStrainRate z1)
 inline constexpr double kStrainRate = 2.0;
-inline constexpr double kTimeScale = 0.05;      ///< s, D = sym(C) kTimeScale
+inline constexpr double kTimeScale = 0.05;           ///< s, D = sym(C) kTimeScale
 inline constexpr double kInvariantSmoothing = 0.05;  ///< d: rounds the kink of the norms at 0
-inline constexpr double kMinimumStretch = 0.05;  ///< singular values are clamped here before the log
+inline constexpr double kMinimumStretch =
+    0.05;  ///< singular values are clamped here before the log
 
 }  // namespace uniphy::kernels
