@@ -47,7 +47,7 @@ function(uniphy_test)
     uniphy_use_torch_pch(${arg_NAME})
   endif()
   # CTest runs tests side by side: threads that spin while they wait would slow the neighbours.
-  gtest_discover_tests(${arg_NAME} DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60
+  gtest_discover_tests(${arg_NAME} DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60 NO_PRETTY_VALUES
     PROPERTIES ENVIRONMENT "OMP_WAIT_POLICY=passive" TIMEOUT 300)
 endfunction()
 
