@@ -1,0 +1,30 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "uniphy/geometry/solid.hpp"
+
+namespace uniphy {
+
+/// Particles given one by one.
+struct ParticleCloud {
+  std::vector<Eigen::Vector3d> x;  ///< m
+  /// m³ of each particle: as long as x, or empty where the file has none.
+  std::vector<double> volume;
+
+  Bounds bounds() const;
+};
+
+/// Reads particles: from an HDF5 file (ends in .h5 or .hdf5) the dataset /x, [particles, 3] or
+/// [frames, particles, 3] (then `frame`), and /volume [particles] where there is one; from any
+/// other file text, three numbers a line, apart by blanks, commas or semicolons; lines that start
+/// with # are skipped, and one line of column names may stand first. Throws Error naming the file
+/// and the line or dataset.
+ParticleCloud read_particles(const std::filesystem::path& file, std::int64_t frame = 0);
+/// The text form; `name` stands for the file in messages.
+ParticleCloud parse_particles(const std::string& text, const std::string& name);
+
+}  // namespace uniphy
