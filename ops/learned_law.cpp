@@ -1,0 +1,221 @@
+#include "ops/learned_law.hpp"
+
+#include <torch/torch.h>
+
+#include <algorithm>
+#include <sstream>
+#include <vector>
+
+#include "ops/kernels/error.hpp"
+#include "ops/kernels/learned_law.hpp"
+
+namespace uniphy::ops {
+
+using kernels::LawKernel;
+using kernels::LearnedLawWeights;
+using kernels::View;
+using torch::Tensor;
+using torch::autograd::AutogradContext;
+using torch::autograd::variable_list;
+
+namespace {
+
+/// Particles a thread takes at once: fixed, so that sums over particles have one order.
+constexpr std::ptrdiff_t kBlock = 4 * kernels::kLawChunk;
+
+std::string describe(const Tensor& t) {
+  if (!t.defined()) return "an undefined tensor";
+  std::ostringstream s;
+  s << t.sizes() << " " << t.scalar_type() << " on " << t.device();
+  return s.str();
+}
+
+void check(const char* name, const Tensor& t, const Tensor& F, bool per_particle, int64_t size) {
+  const bool typed = t.defined() && t.device().is_cpu() && t.scalar_type() == F.scalar_type();
+  const bool shaped = typed && (per_particle ? t.sizes() == F.sizes() : t.sizes() == size);
+  if (shaped) return;
+  std::ostringstream s;
+  s << "learned law: " << name << ": expected ";
+  if (per_particle)
+    s << F.sizes();
+  else
+    s << "[" << size << "]";
+  throw Error(s.str() + " " + c10::toString(F.scalar_type()) + " on cpu, found " + describe(t));
+}
+
+void check_arguments(const SharedWeights& weights, const char* F_name, const Tensor& F,
+                     const Tensor& C, const Tensor& z) {
+  if (!weights) throw Error("learned law: expected a trained model, found none");
+  if (!F.defined() || !F.device().is_cpu() || F.dim() != 3 || F.size(1) != 3 || F.size(2) != 3 ||
+      (F.scalar_type() != torch::kFloat32 && F.scalar_type() != torch::kFloat64))
+    throw Error(std::string("learned law: ") + F_name +
+                ": expected [P, 3, 3] Float or Double on cpu, found " + describe(F));
+  if (C.defined()) check("C", C, F, true, 0);
+  check("z", z, F, false, weights->latent_size);
+}
+
+template <class T>
+View<const T> view(const Tensor& t) {
+  return {t.defined() ? t.data_ptr<T>() : nullptr, 9, 1};
+}
+template <class T>
+View<T> mutable_view(const Tensor& t) {
+  return {t.defined() ? t.data_ptr<T>() : nullptr, 9, 1};
+}
+
+/// The kernels of one forward call, kept for its backward.
+struct Kernel : torch::CustomClassHolder {
+  std::shared_ptr<const LawKernel<float>> narrow;
+  std::shared_ptr<const LawKernel<double>> wide;
+
+  Kernel(const SharedWeights& weights, const Tensor& z) {
+    kernels::LawDescription d;
+    d.id = kernels::LawId::learned;
+    d.weights = weights;
+    const Tensor numbers = z.to(torch::kFloat64).contiguous();
+    d.z.assign(numbers.data_ptr<double>(), numbers.data_ptr<double>() + numbers.numel());
+    if (z.scalar_type() == torch::kFloat64)
+      wide = kernels::make_learned_law<double>(d);
+    else
+      narrow = kernels::make_learned_law<float>(d);
+  }
+};
+
+template <class T>
+void evaluate(const LawKernel<T>& law, const Tensor& F, const Tensor& C, const Tensor& F_proj,
+              const Tensor& tau) {
+  const std::ptrdiff_t count = F.size(0);
+  const View<const T> f = view<T>(F), c = view<T>(C);
+  const View<T> fp = mutable_view<T>(F_proj), t = mutable_view<T>(tau);
+#pragma omp parallel for schedule(static)
+  for (std::ptrdiff_t p = 0; p < count; p += kBlock)
+    law.evaluate(std::min(kBlock, count - p), T(0), f.from(p), c.from(p), fp.from(p), t.from(p));
+}
+
+template <class T>
+void adjoint(const LawKernel<T>& law, const Tensor& F, const Tensor& C, const Tensor& grad_F_proj,
+             const Tensor& grad_tau, const Tensor& grad_F, const Tensor& grad_C,
+             const Tensor& grad_z) {
+  const std::ptrdiff_t count = F.size(0), blocks = (count + kBlock - 1) / kBlock;
+  const std::ptrdiff_t size = law.accumulator_size();
+  const View<const T> f = view<T>(F), c = view<T>(C), gp = view<T>(grad_F_proj),
+                      gt = view<T>(grad_tau);
+  const View<T> gf = mutable_view<T>(grad_F), gc = mutable_view<T>(grad_C);
+  std::vector<T> sums(grad_z.defined() ? std::size_t(blocks * size) : 0, T(0));
+#pragma omp parallel for schedule(static)
+  for (std::ptrdiff_t b = 0; b < blocks; ++b) {
+    const std::ptrdiff_t p = b * kBlock;
+    law.adjoint(std::min(kBlock, count - p), T(0), f.from(p), c.from(p), gp.from(p), gt.from(p),
+                gf.from(p), gc.from(p), sums.empty() ? nullptr : sums.data() + b * size);
+  }
+  if (!grad_z.defined()) return;
+  std::vector<T> total(std::size_t(size), T(0));
+  for (std::ptrdiff_t b = 0; b < blocks; ++b)
+    for (std::ptrdiff_t k = 0; k < size; ++k) total[k] += sums[b * size + k];
+  law.parameter_gradient(total.data(), grad_z.data_ptr<T>());
+}
+
+class LearnedLawFunction : public torch::autograd::Function<LearnedLawFunction> {
+ public:
+  static variable_list forward(AutogradContext* ctx, const Tensor& F, const Tensor& C,
+                               const Tensor& z, const SharedWeights& weights) {
+    const Tensor f = F.contiguous(), c = C.contiguous();
+    const auto kernel = c10::make_intrusive<Kernel>(weights, z);
+    Tensor F_proj = torch::empty_like(f), tau = torch::empty_like(f);
+    if (kernel->wide)
+      evaluate(*kernel->wide, f, c, F_proj, tau);
+    else
+      evaluate(*kernel->narrow, f, c, F_proj, tau);
+    ctx->save_for_backward({f, c, z});
+    ctx->saved_data["kernel"] = torch::IValue::make_capsule(kernel);
+    ctx->set_materialize_grads(false);
+    return {F_proj, tau};
+  }
+
+  static variable_list backward(AutogradContext* ctx, variable_list grad) {
+    if (!grad[0].defined() && !grad[1].defined()) return {Tensor(), Tensor(), Tensor(), Tensor()};
+    const auto saved = ctx->get_saved_variables();
+    const Tensor F = saved[0], C = saved[1], z = saved[2];
+    const auto kernel =
+        c10::static_intrusive_pointer_cast<Kernel>(ctx->saved_data["kernel"].toCapsule());
+    const auto given = [&F](const Tensor& g) {
+      return g.defined() ? g.contiguous() : torch::zeros_like(F);
+    };
+    const Tensor grad_F_proj = given(grad[0]), grad_tau = given(grad[1]);
+    // The adjoint adds to the gradient of C.
+    Tensor grad_F, grad_C, grad_z;
+    if (ctx->needs_input_grad(0)) grad_F = torch::empty_like(F);
+    if (ctx->needs_input_grad(1)) grad_C = torch::zeros_like(C);
+    if (ctx->needs_input_grad(2)) grad_z = torch::zeros_like(z, torch::MemoryFormat::Contiguous);
+    if (kernel->wide)
+      adjoint(*kernel->wide, F, C, grad_F_proj, grad_tau, grad_F, grad_C, grad_z);
+    else
+      adjoint(*kernel->narrow, F, C, grad_F_proj, grad_tau, grad_F, grad_C, grad_z);
+    return {grad_F, grad_C, grad_z, Tensor()};
+  }
+};
+
+LawOutput apply(const SharedWeights& weights, const Tensor& F, const Tensor& C, const Tensor& z) {
+  const auto r = LearnedLawFunction::apply(F, C, z, weights);
+  return {r[0], r[1]};
+}
+
+/// One linear layer that answers with `bias` whatever its input.
+kernels::MlpWeights constant_network(int in, const std::vector<double>& bias) {
+  kernels::MlpWeights::Layer layer;
+  layer.in = in;
+  layer.out = int(bias.size());
+  layer.weight.assign(std::size_t(layer.in) * layer.out, 0.0);
+  layer.bias = bias;
+  return {{layer}};
+}
+
+/// The same law with G(F) = F to the bit: caps out of reach (isotropic), no change (seed).
+SharedWeights without_projection(const LearnedLawWeights& weights) {
+  const auto shape = kernels::network_shape(weights.form);
+  auto r = std::make_shared<LearnedLawWeights>();
+  r->form = weights.form;
+  r->latent_size = weights.latent_size;
+  r->activation = weights.activation;
+  r->stress = weights.stress;
+  r->projection = constant_network(
+      shape.projection_in + weights.latent_size,
+      std::vector<double>(shape.projection_out,
+                          weights.form == kernels::LawForm::isotropic ? 1e30 : 0.0));
+  return r;
+}
+
+SharedWeights without_stress(const LearnedLawWeights& weights) {
+  const auto shape = kernels::network_shape(weights.form);
+  auto r = std::make_shared<LearnedLawWeights>();
+  r->form = weights.form;
+  r->latent_size = weights.latent_size;
+  r->activation = weights.activation;
+  r->projection = weights.projection;
+  r->stress = constant_network(shape.stress_in + weights.latent_size,
+                               std::vector<double>(shape.stress_out, 0.0));
+  return r;
+}
+
+}  // namespace
+
+LawOutput learned_law(const SharedWeights& weights, const Tensor& F_trial, const Tensor& C,
+                      const Tensor& z) {
+  check_arguments(weights, "F_trial", F_trial, C, z);
+  if (!C.defined()) check("C", C, F_trial, true, 0);
+  return apply(weights, F_trial, C, z);
+}
+
+Tensor learned_project(const SharedWeights& weights, const Tensor& F, const Tensor& z) {
+  check_arguments(weights, "F", F, Tensor(), z);
+  return apply(without_stress(*weights), F, torch::zeros_like(F), z).F_proj;
+}
+
+Tensor learned_stress(const SharedWeights& weights, const Tensor& F_proj, const Tensor& C,
+                      const Tensor& z) {
+  check_arguments(weights, "F_proj", F_proj, C, z);
+  if (!C.defined()) check("C", C, F_proj, true, 0);
+  return apply(without_projection(*weights), F_proj, C, z).tau;
+}
+
+}  // namespace uniphy::ops

@@ -1,0 +1,87 @@
+#include "ops/reference/isotropic_tensors.hpp"
+
+#include <torch/torch.h>
+
+namespace uniphy::ops::reference {
+
+using torch::Tensor;
+using torch::autograd::AutogradContext;
+using torch::autograd::variable_list;
+
+namespace {
+
+constexpr double kStretchFloor = 0.05;
+constexpr double kSumFloor = 1e-5;
+
+Tensor rows(const Tensor& v) { return v.unsqueeze(2); }     // [P, 3, 1]: the value of row i
+Tensor columns(const Tensor& v) { return v.unsqueeze(1); }  // [P, 1, 3]: the value of column j
+
+/// 1/(σ_i + σ_j), sign kept, magnitude of the sum at least 1e-5. [P, 3, 3]
+Tensor inverse_sum(const Tensor& sigma) {
+  const Tensor sum = rows(sigma) + columns(sigma);
+  const Tensor magnitude = sum.abs().clamp_min(kSumFloor);
+  return 1 / torch::where(sum < 0, -magnitude, magnitude);
+}
+
+/// (ε_i − ε_j)/(σ_i − σ_j) of ε = log max(σ, floor); on the diagonal dε_i/dσ_i. [P, 3, 3]
+Tensor strain_divided_difference(const Tensor& sigma) {
+  const Tensor stretch = sigma.clamp_min(kStretchFloor);
+  const Tensor a = rows(stretch), b = columns(stretch), gap = a - b;
+  const Tensor same = gap == 0, one = torch::ones_like(gap);
+  const Tensor of_log =
+      torch::where(same, 1 / (b * one), torch::log1p(gap / b) / torch::where(same, one, gap));
+  // (stretch_i − stretch_j)/(σ_i − σ_j): 1 above the clamp, 0 below it.
+  const Tensor raw = rows(sigma) - columns(sigma);
+  const Tensor above = (rows(sigma) > kStretchFloor) & (columns(sigma) > kStretchFloor);
+  const Tensor ratio =
+      torch::where(raw == 0, torch::zeros_like(raw), gap / torch::where(raw == 0, one, raw));
+  return of_log * torch::where(above, one, ratio);
+}
+
+class HenckyFunction : public torch::autograd::Function<HenckyFunction> {
+ public:
+  static Tensor forward(AutogradContext* ctx, const Tensor& F) {
+    const SignedSvd s = signed_svd(F.detach());
+    ctx->save_for_backward({s.U, s.sigma, s.V});
+    return (s.U * columns(s.sigma.clamp_min(kStretchFloor).log())).matmul(s.U.mT());
+  }
+
+  static variable_list backward(AutogradContext* ctx, variable_list grad) {
+    if (!grad[0].defined()) return {Tensor()};
+    const auto saved = ctx->get_saved_variables();
+    const Tensor U = saved[0], sigma = saved[1], V = saved[2];
+    const Tensor S = U.mT().matmul(grad[0] + grad[0].mT()).matmul(U);  // twice the symmetric part
+    const Tensor c = S * strain_divided_difference(sigma);
+    const Tensor off = c * inverse_sum(sigma) * columns(sigma);
+    const Tensor diagonal = torch::eye(3, U.options()).to(torch::kBool);
+    return {U.matmul(torch::where(diagonal, 0.5 * c, off)).matmul(V.mT())};
+  }
+};
+
+class PolarFunction : public torch::autograd::Function<PolarFunction> {
+ public:
+  static Tensor forward(AutogradContext* ctx, const Tensor& /*F*/, const Tensor& U,
+                        const Tensor& sigma, const Tensor& V) {
+    ctx->save_for_backward({U, sigma, V});
+    return U.matmul(V.mT());
+  }
+
+  static variable_list backward(AutogradContext* ctx, variable_list grad) {
+    if (!grad[0].defined()) return {Tensor(), Tensor(), Tensor(), Tensor()};
+    const auto saved = ctx->get_saved_variables();
+    const Tensor U = saved[0], sigma = saved[1], V = saved[2];
+    const Tensor P = U.mT().matmul(grad[0]).matmul(V);
+    const Tensor A = (P - P.mT()) * inverse_sum(sigma);
+    return {U.matmul(A).matmul(V.mT()), Tensor(), Tensor(), Tensor()};
+  }
+};
+
+}  // namespace
+
+Tensor hencky_tensor(const Tensor& F) { return HenckyFunction::apply(F); }
+
+Tensor polar_rotation(const Tensor& F, const SignedSvd& factors) {
+  return PolarFunction::apply(F, factors.U.detach(), factors.sigma.detach(), factors.V.detach());
+}
+
+}  // namespace uniphy::ops::reference

@@ -1,0 +1,185 @@
+#include "ops/reference/learned_law.hpp"
+
+#include <torch/torch.h>
+
+#include <limits>
+
+#include "ops/reference/isotropic_tensors.hpp"
+
+namespace uniphy::ops::reference {
+
+using kernels::Activation;
+using kernels::LawForm;
+using torch::Tensor;
+
+namespace {
+
+Tensor activate(Activation activation, const Tensor& x) {
+  switch (activation) {
+    case Activation::gelu:
+      return torch::gelu(x);
+    case Activation::silu:
+      return torch::silu(x);
+    case Activation::squareplus:
+      break;
+  }
+  return 0.5 * (x + (x * x + 4).sqrt()) - 1;
+}
+
+/// The answer at F = I, C = 0, where every isotropic feature is 0: [1 or P, out].
+Tensor at_rest(const LearnedLawTensors& law, const MlpTensors& net, const Tensor& z) {
+  const auto n = net.weight[0].size(1) - z.size(-1);
+  return law.mlp(net, law.activation, torch::zeros({z.dim() == 2 ? z.size(0) : 1, n}, z.options()),
+                 z);
+}
+
+Tensor trace_of(const Tensor& m) { return torch::diagonal(m, 0, 1, 2).sum(-1); }  // [P]
+Tensor identity(const Tensor& like) { return torch::eye(3, like.options()); }
+Tensor at_matrix(const Tensor& s) { return s.unsqueeze(-1).unsqueeze(-1); }  // [P] → [P, 1, 1]
+Tensor contract(const Tensor& a, const Tensor& b) { return (a * b).sum({1, 2}); }
+Tensor deviator(const Tensor& m) { return m - at_matrix(trace_of(m) / 3) * identity(m); }
+Tensor symmetric(const Tensor& m) { return 0.5 * (m + m.mT()); }
+
+/// Smooth invariants of w = ε̂/e.
+struct Invariants {
+  Tensor W;      ///< dev H / e, [P, 3, 3]
+  Tensor t;      ///< tr H / e, [P]
+  Tensor q;      ///< sqrt(‖W‖² + d²) − d
+  Tensor cubic;  ///< tr W³/(‖W‖² + d²)
+};
+Invariants invariants(const Tensor& H, const Tensor& e) {
+  constexpr double d = kernels::kInvariantSmoothing;
+  Invariants v;
+  v.W = deviator(H) / at_matrix(e);
+  v.t = trace_of(H) / e;
+  const Tensor root2 = contract(v.W, v.W) + d * d;
+  v.q = root2.sqrt() - d;
+  v.cubic = contract(v.W.matmul(v.W), v.W) / root2;
+  return v;
+}
+
+Tensor isotropic_project(const LearnedLawTensors& law, const Tensor& F, const Tensor& z) {
+  const Tensor H = hencky_tensor(F);
+  const Tensor e = strain_scale(z);
+  const Tensor caps = isotropic_caps(law, H, z);
+  const Tensor c1 = caps.select(1, 0), cap_q = e * c1.clamp_min(0), cap_t = e * caps.select(1, 1);
+  const Tensor H_dev = deviator(H), t = trace_of(H), norm2 = contract(H_dev, H_dev);
+  const Tensor one = torch::ones_like(norm2);
+  const double tiny = H.scalar_type() == torch::kFloat64
+                          ? std::numeric_limits<double>::min()
+                          : double(std::numeric_limits<float>::min());
+  const Tensor deviates = norm2 > tiny;
+  const Tensor norm = torch::where(deviates, norm2, one).sqrt();
+  const Tensor over = deviates & (norm > cap_q), over_t = t > cap_t;
+  // Without a deviator there is nothing to scale, but its derivative is: the limit from above.
+  const Tensor scale =
+      torch::where(over, cap_q / norm, torch::where(deviates | (c1 > 0), one, one * 0));
+  const Tensor trace_proj = torch::where(over_t, cap_t, t);
+  const Tensor M = at_matrix(scale) * H_dev + at_matrix(trace_proj / 3) * identity(F);
+  const Tensor yielded = torch::matrix_exp(M).matmul(polar_rotation(F, signed_svd(F.detach())));
+  return torch::where(at_matrix(over | over_t), yielded, F);
+}
+
+constexpr double kSeedFloor = 1e-6;
+
+Tensor seed_project(const LearnedLawTensors& law, const Tensor& F, const Tensor& z) {
+  const SignedSvd s = signed_svd(F);
+  const Tensor features =
+      torch::cat({F.flatten(1), s.U.flatten(1), s.sigma, s.V.mT().flatten(1)}, 1);
+  return F + law.mlp(law.projection, law.activation, features, z).reshape(F.sizes());
+}
+
+Tensor seed_stress(const LearnedLawTensors& law, const Tensor& F, const Tensor& C,
+                   const Tensor& z) {
+  const SignedSvd s = signed_svd(F);
+  const Tensor R = polar_rotation(F, s);
+  // Not torch's determinant, whose gradient divides by J.
+  const Tensor J = (torch::linalg_cross(F.select(1, 0), F.select(1, 1)) * F.select(1, 2)).sum(1);
+  const Tensor F_max = F.select(1, 0).select(1, 0).clamp_min(kSeedFloor);
+  const Tensor rate = R.mT().matmul(C).matmul(R) * kernels::kTimeScale;
+  const Tensor features =
+      torch::cat({s.sigma, F.mT().matmul(F).flatten(1), J.unsqueeze(1),
+                  J.clamp_min(kSeedFloor).log().unsqueeze(1), F_max.unsqueeze(1),
+                  F_max.log().unsqueeze(1), rate.flatten(1)},
+                 1);
+  const Tensor S = law.mlp(law.stress, law.activation, features, z).reshape(F.sizes());
+  return at_matrix(stress_scale(z)) * R.matmul(symmetric(S)).matmul(R.mT());
+}
+
+}  // namespace
+
+Tensor plain_mlp(const MlpTensors& net, Activation activation, const Tensor& features,
+                 const Tensor& z) {
+  const auto n = features.size(1);
+  const Tensor first = net.weight[0];
+  Tensor x = torch::matmul(features, first.slice(1, 0, n).t()) +
+             (torch::matmul(z, first.slice(1, n).t()) + net.bias[0]);
+  for (std::size_t k = 1; k < net.weight.size(); ++k)
+    x = torch::linear(activate(activation, x), net.weight[k], net.bias[k]);
+  return x;
+}
+
+LearnedLawTensors to_tensors(const kernels::LearnedLawWeights& weights, torch::Dtype dtype) {
+  const auto tensors = [dtype](const kernels::MlpWeights& from) {
+    MlpTensors to;
+    for (const auto& layer : from.layers) {
+      to.weight.push_back(
+          torch::tensor(layer.weight, torch::kFloat64).reshape({layer.out, layer.in}).to(dtype));
+      to.bias.push_back(torch::tensor(layer.bias, torch::kFloat64).to(dtype));
+    }
+    return to;
+  };
+  LearnedLawTensors law;
+  law.form = weights.form;
+  law.activation = weights.activation;
+  law.projection = tensors(weights.projection);
+  law.stress = tensors(weights.stress);
+  return law;
+}
+
+Tensor stress_scale(const Tensor& z) {
+  if (z.size(-1) < 1) return torch::full({}, kernels::kStressScale, z.options());
+  return kernels::kStressScale * torch::exp(kernels::kStressRate * z.select(-1, 0));
+}
+
+Tensor strain_scale(const Tensor& z) {
+  if (z.size(-1) < 2) return torch::full({}, kernels::kStrainScale, z.options());
+  return kernels::kStrainScale * torch::exp(kernels::kStrainRate * z.select(-1, 1));
+}
+
+Tensor isotropic_caps(const LearnedLawTensors& law, const Tensor& H, const Tensor& z) {
+  const Invariants v = invariants(H, strain_scale(z));
+  const Tensor c = law.mlp(law.projection, law.activation, torch::stack({v.t, v.q, v.cubic}, 1), z);
+  const Tensor rest = at_rest(law, law.projection, z).select(1, 1).clamp_max(0);
+  return torch::stack({c.select(1, 0), c.select(1, 1) - rest}, 1);
+}
+
+Tensor isotropic_stress(const LearnedLawTensors& law, const Tensor& H, const Tensor& C,
+                        const Tensor& z) {
+  constexpr double d = kernels::kInvariantSmoothing;
+  const Invariants v = invariants(H, strain_scale(z));
+  const Tensor D = symmetric(C) * kernels::kTimeScale, D_dev = deviator(D), D_trace = trace_of(D);
+  const Tensor n = (contract(D_dev, D_dev) + d * d).sqrt() - d;
+  const Tensor x = contract(v.W, D_dev) / (1 + n * v.q);
+  const Tensor f =
+      law.mlp(law.stress, law.activation, torch::stack({v.t, v.q, v.cubic, D_trace, n, x}, 1), z);
+  const Tensor rest = at_rest(law, law.stress, z).select(1, 1);
+  const auto coefficient = [&f](int k) { return f.select(1, k); };  // k, a₀, a₁, a₂, b
+  const Tensor pressure = coefficient(0) * v.t + (coefficient(1) - rest);
+  const Tensor in_units_of_s = at_matrix(pressure) * identity(H) + at_matrix(coefficient(2)) * v.W +
+                               at_matrix(coefficient(3) / (1 + v.q)) * deviator(v.W.matmul(v.W)) +
+                               at_matrix(coefficient(4)) * D;
+  return at_matrix(stress_scale(z)) * in_units_of_s;
+}
+
+Tensor learned_project(const LearnedLawTensors& law, const Tensor& F, const Tensor& z) {
+  return law.form == LawForm::isotropic ? isotropic_project(law, F, z) : seed_project(law, F, z);
+}
+
+Tensor learned_stress(const LearnedLawTensors& law, const Tensor& F_proj, const Tensor& C,
+                      const Tensor& z) {
+  return law.form == LawForm::isotropic ? isotropic_stress(law, hencky_tensor(F_proj), C, z)
+                                        : seed_stress(law, F_proj, C, z);
+}
+
+}  // namespace uniphy::ops::reference
