@@ -1,5 +1,6 @@
 #pragma once
 
+#include "ops/kernels/material.hpp"
 #include "ops/kernels/volumetric.hpp"
 
 namespace uniphy::kernels {

@@ -56,16 +56,17 @@ enum class LawId {
 /// Everything that names one material. Parameters that the law does not have stay 0.
 struct LawDescription {
   LawId id = LawId::elastic;
-  double mu = 0;      ///< Pa (Pa s for newtonian)
-  double lambda = 0;  ///< Pa
-  double tau_y = 0;   ///< Pa
-  double theta = 0;   ///< friction angle, rad
-  double eta = 0;     ///< Pa s
+  double mu = 0;                                     ///< Pa (Pa s for newtonian)
+  double lambda = 0;                                 ///< Pa
+  double tau_y = 0;                                  ///< Pa
+  double theta = 0;                                  ///< friction angle, rad
+  double eta = 0;                                    ///< Pa s
   std::shared_ptr<const LearnedLawWeights> weights;  ///< learned only
   std::vector<double> z;                             ///< learned only, latent_size numbers
 };
 
-/// The name of a law in YAML and HDF5 ("elastic", ...). law_id throws Error listing the known names.
+/// The name of a law in YAML and HDF5 ("elastic", ...). law_id throws Error listing the known
+/// names.
 const char* law_name(LawId id);
 LawId law_id(const std::string& name);
 /// The parameters that a law takes, in the order of its gradient: subset of

@@ -5,6 +5,7 @@
 #include "ops/kernels/drucker_prager.hpp"
 #include "ops/kernels/fixed_corotated.hpp"
 #include "ops/kernels/law_batch.hpp"
+#include "ops/kernels/neo_hookean.hpp"
 #include "ops/kernels/newtonian.hpp"
 #include "ops/kernels/plastic_law.hpp"
 #include "ops/kernels/viscoplastic.hpp"

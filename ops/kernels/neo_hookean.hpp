@@ -1,13 +1,10 @@
 #pragma once
 
+#include "ops/kernels/clamped_volume.hpp"
 #include "ops/kernels/material.hpp"
 
 namespace uniphy::kernels {
 inline namespace UNIPHY_ISA {
-
-/// J is clamped here below where a logarithm or a root is taken, so that an inverted F has a
-/// finite stress; the derivative with respect to J is zero below the clamp.
-inline constexpr double kMinimumJ = 1e-6;
 
 /// Compressible neo-Hookean solid: τ = μ F Fᵀ + (λ log J − μ) I, J = max(det F, 1e-6).
 /// F is dimensionless; τ, μ, λ in Pa.
@@ -16,7 +13,7 @@ struct NeoHookean {
   template <class V>
   static UNIPHY_INLINE Mat3<V> stress(const Mat3<V>& F, const Mat3<V>& /*C*/,
                                       const Material<V>& m) {
-    const V J = lane_max(V(ScalarOf<V>(kMinimumJ)), determinant(F));
+    const V J = clamped_volume(determinant(F), V(ScalarOf<V>(kMinimumJ)));
     const V shift = m.lambda * lane_log(J) - m.mu;
     Mat3<V> tau = mult(F, F) * m.mu;
     for (int i = 0; i < 3; ++i) tau(i, i) = tau(i, i) + shift;
@@ -30,7 +27,7 @@ struct NeoHookean {
                                               const Material<V>& m, const Mat3<V>& G,
                                               Mat3<V>& /*grad_C*/, MaterialGradient<V>& g) {
     using T = ScalarOf<V>;
-    const V floor = V(T(kMinimumJ)), det = determinant(F), J = lane_max(floor, det);
+    const V floor = V(T(kMinimumJ)), det = determinant(F), J = clamped_volume(det, floor);
     const V trace_G = trace(G);
     const V slope = select<V>(det < floor, V(T(0)), m.lambda * trace_G / J);
     g.mu = g.mu + dot(G, mult(F, F)) - trace_G;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "ops/kernels/clamped_volume.hpp"
 #include "ops/kernels/material.hpp"
 
 namespace uniphy::kernels {
@@ -23,7 +24,7 @@ struct Newtonian {
   template <class V>
   static UNIPHY_INLINE Mat3<V> stress(const Mat3<V>& F, const Mat3<V>& C, const Material<V>& m) {
     using T = ScalarOf<V>;
-    const V J = lane_max(V(minimum_J<T>()), determinant(F));
+    const V J = clamped_volume(determinant(F), V(minimum_J<T>()));
     const V kappa = fma(V(T(2.0 / 3)), m.mu, m.lambda);
     const V pressure = kappa * (J - inverse_sixth_power(J));
     Mat3<V> tau = sym(C) * m.mu;
@@ -38,7 +39,7 @@ struct Newtonian {
                                               const Material<V>& m, const Mat3<V>& G,
                                               Mat3<V>& grad_C, MaterialGradient<V>& g) {
     using T = ScalarOf<V>;
-    const V floor = V(minimum_J<T>()), det = determinant(F), J = lane_max(floor, det);
+    const V floor = V(minimum_J<T>()), det = determinant(F), J = clamped_volume(det, floor);
     const V kappa = fma(V(T(2.0 / 3)), m.mu, m.lambda);
     const V sixth = inverse_sixth_power(J), trace_G = trace(G);
     const Mat3<V> symmetric = sym(G);

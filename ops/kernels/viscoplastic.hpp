@@ -9,8 +9,8 @@ inline namespace UNIPHY_ISA {
 /// k = τ_Y/(2μ), δγ = q − k, μ̂ = (μ/3) tr(Σ²) and s = 2μ ε̂:
 /// δγ ≤ 0: F. Else ŝ = ‖s‖ − 2μ δγ/(1 + η/(2μ̂Δt)) and F becomes
 /// U exp((ŝ/(2μ)) ε̂/q + tr(ε)/3) Vᵀ. Σ in μ̂ is clamped below at 0.05 like the strain.
-/// In other words ε̂ shrinks by (k + r δγ)/q with r = η/(2μ̂Δt + η): r = 0 is von Mises, to the last
-/// bit, and r = 1 the identity. τ_Y, μ in Pa, η in Pa s, Δt in s.
+/// In other words ε̂ shrinks by (k + r δγ)/q with r = η/(2μ̂Δt + η): r = 0 is von Mises exactly
+/// and r = 1 the identity. τ_Y, μ in Pa, η in Pa s, Δt in s.
 /// Y. Yue et al., Continuum foam: a material point method for shear-dependent flows, ACM TOG 2015.
 struct Viscoplastic {
   /// m = 2μ̂Δt and r = η/(m + η), 0 where both vanish.

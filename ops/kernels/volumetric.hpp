@@ -1,6 +1,6 @@
 #pragma once
 
-#include "ops/kernels/neo_hookean.hpp"
+#include "ops/kernels/clamped_volume.hpp"
 
 namespace uniphy::kernels {
 inline namespace UNIPHY_ISA {
@@ -22,7 +22,7 @@ struct VolumetricProjection {
   template <class V>
   static UNIPHY_INLINE Mat3<V> project(const Mat3<V>& F) {
     using T = ScalarOf<V>;
-    const V root = cbrt_positive(lane_max(V(T(kMinimumJ)), determinant(F)));
+    const V root = cbrt_positive(clamped_volume(determinant(F), V(T(kMinimumJ))));
     Mat3<V> r = zero3<V>();
     for (int i = 0; i < 3; ++i) r(i, i) = root;
     return r;
@@ -31,7 +31,7 @@ struct VolumetricProjection {
   template <class V>
   static UNIPHY_INLINE Mat3<V> adjoint(const Mat3<V>& F, const Mat3<V>& grad) {
     using T = ScalarOf<V>;
-    const V floor = V(T(kMinimumJ)), det = determinant(F), J = lane_max(floor, det);
+    const V floor = V(T(kMinimumJ)), det = determinant(F), J = clamped_volume(det, floor);
     const V slope = trace(grad) * cbrt_positive(J) / (J * V(T(3)));
     return cofactor(F) * select<V>(det < floor, V(T(0)), slope);
   }
