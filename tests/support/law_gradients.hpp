@@ -1,0 +1,137 @@
+#pragma once
+
+#include <algorithm>
+#include <numeric>
+#include <vector>
+
+#include "ops/kernels/analytic_law.hpp"
+#include "tests/support/finite_differences.hpp"
+#include "tests/support/law_cases.hpp"
+
+namespace uniphy::testing {
+
+/// Which entry of the table is differentiated.
+enum class Stage { project, stress, fused };
+
+inline const char* stage_name(Stage stage) {
+  return stage == Stage::project ? "project" : stage == Stage::stress ? "stress" : "fused";
+}
+
+using ParameterArray = std::vector<double>;  ///< mu, lambda, tau_y, theta, eta
+
+inline ParameterArray parameter_array(const kernels::LawDescription& d) {
+  return {d.mu, d.lambda, d.tau_y, d.theta, d.eta};
+}
+inline kernels::LawParameters<double> to_parameters(const ParameterArray& p) {
+  return {p[0], p[1], p[2], p[3], p[4]};
+}
+
+/// The scalar L = W₁ : F_proj + W₂ : τ/s of one particle, its gradient by the adjoint kernels and
+/// by central differences.
+struct LawGradientCheck {
+  kernels::LawTable<double>::Law law;
+  std::vector<int> places;  ///< the parameters that the law has
+  Stage stage = Stage::fused;
+  double dt = 1e-4;
+  Matrix W1, W2;  ///< W2 already divided by the stress scale
+
+  static kernels::View<const double> view(const double* data) { return {data, 9, 1}; }
+  static kernels::View<double> view(double* data) { return {data, 9, 1}; }
+
+  double loss(const Matrix& F, const Matrix& C, const ParameterArray& p) const {
+    Matrix projected{}, tau{};
+    const auto parameters = to_parameters(p);
+    if (stage == Stage::project) {
+      law.project(1, parameters, dt, view(F.data()), view(projected.data()));
+      return inner(W1, projected);
+    }
+    if (stage == Stage::stress) {
+      law.stress(1, parameters, view(F.data()), view(C.data()), view(tau.data()));
+      return inner(W2, tau);
+    }
+    law.evaluate(1, parameters, dt, view(F.data()), view(C.data()), view(projected.data()),
+                 view(tau.data()));
+    return inner(W1, projected) + inner(W2, tau);
+  }
+
+  void adjoint(const Matrix& F, const Matrix& C, const ParameterArray& p, Matrix& grad_F,
+               Matrix& grad_C, ParameterArray& grad_p) const {
+    kernels::LawParameters<double> sum;
+    const auto parameters = to_parameters(p);
+    grad_F = {};
+    grad_C = {};
+    if (stage == Stage::project) {
+      law.project_adjoint(1, parameters, dt, view(F.data()), view(W1.data()), view(grad_F.data()),
+                          &sum);
+    } else if (stage == Stage::stress) {
+      law.stress_adjoint(1, parameters, view(F.data()), view(C.data()), view(W2.data()),
+                         view(grad_F.data()), view(grad_C.data()), &sum);
+    } else {
+      law.adjoint(1, parameters, dt, view(F.data()), view(C.data()), view(W1.data()),
+                  view(W2.data()), view(grad_F.data()), view(grad_C.data()), &sum);
+    }
+    grad_p = {sum.mu, sum.lambda, sum.tau_y, sum.theta, sum.eta};
+  }
+
+  struct Errors {
+    double F = 0, C = 0, parameters = 0;
+    double size_F = 0, size_C = 0, size_parameters = 0;  ///< norms of the differences' gradients
+    double worst() const { return std::max({F, C, parameters}); }
+  };
+
+  Errors errors(const Matrix& F, const Matrix& C, const ParameterArray& p, double step) const {
+    Matrix grad_F, grad_C;
+    ParameterArray grad_p;
+    adjoint(F, C, p, grad_F, grad_C, grad_p);
+    const auto vector = [](const Matrix& m) { return std::vector<double>(m.begin(), m.end()); };
+    const auto matrix = [](const std::vector<double>& v) {
+      Matrix m;
+      std::copy(v.begin(), v.end(), m.begin());
+      return m;
+    };
+    const std::vector<double> of_F =
+        central_differences([&](const std::vector<double>& x) { return loss(matrix(x), C, p); },
+                            vector(F), std::vector<double>(9, step));
+    // The laws are linear in C, so that a large step costs nothing.
+    const std::vector<double> of_C =
+        central_differences([&](const std::vector<double>& x) { return loss(F, matrix(x), p); },
+                            vector(C), std::vector<double>(9, 10.0));
+    std::vector<double> steps(p.size());
+    for (std::size_t i = 0; i < p.size(); ++i) steps[i] = 2e-4 * p[i];
+    std::vector<double> of_p =
+        central_differences([&](const std::vector<double>& x) { return loss(F, C, x); }, p, steps);
+    // Parameters differ by orders of magnitude: compare the derivatives by their logarithms.
+    for (std::size_t i = 0; i < p.size(); ++i) {
+      of_p[i] *= p[i];
+      grad_p[i] *= p[i];
+    }
+    Errors e;
+    const auto size = [](const std::vector<double>& v) {
+      return relative_error(std::vector<double>(v.size(), 0.0), v) > 0
+                 ? std::sqrt(std::inner_product(v.begin(), v.end(), v.begin(), 0.0))
+                 : 0.0;
+    };
+    e.size_F = size(of_F);
+    e.size_C = size(of_C);
+    e.size_parameters = size(of_p);
+    e.F = relative_error(vector(grad_F), of_F);
+    // Near det F = 0 the pressure of a fluid, J⁻⁶, drowns differences with respect to C.
+    if (det(F) > 0.1) e.C = relative_error(vector(grad_C), of_C);
+    e.parameters = relative_error(grad_p, of_p);
+    return e;
+  }
+};
+
+/// A check of one law at random weights.
+inline LawGradientCheck make_check(kernels::LawId id, Stage stage, kernels::Isa isa,
+                                   std::mt19937_64& random) {
+  LawGradientCheck check;
+  check.law = kernels::law_table<double>(isa).laws[static_cast<int>(id)];
+  check.places = kernels::parameter_places(id);
+  check.stage = stage;
+  check.W1 = random_matrix(random);
+  check.W2 = random_matrix(random, 1e-5);
+  return check;
+}
+
+}  // namespace uniphy::testing
