@@ -36,6 +36,8 @@ DatasetWriter::DatasetWriter(const std::filesystem::path& file, const std::strin
   }
   writer_.extendible<std::int32_t>("samples/trajectory", {},
                                    {"1", "row of /trajectories of each sample", gzip});
+  writer_.extendible<std::int32_t>(
+      "samples/source", {}, {"1", "0: state of a simulation, 1: state drawn at random", gzip});
 }
 
 void DatasetWriter::append(const TrajectoryRecord& record, const LawSamples& samples) {
@@ -47,12 +49,19 @@ void DatasetWriter::append(const TrajectoryRecord& record, const LawSamples& sam
                               writer_.file().string(), field.name, size * 9, data.size()));
     }
   }
+  std::vector<std::int32_t> source = samples.source;
+  if (source.empty()) source.assign(static_cast<std::size_t>(size), kSimulatedSample);
+  if (static_cast<std::int64_t>(source.size()) != size) {
+    throw Error(fmt::format("{}: /samples/source: expected {} numbers, found {}",
+                            writer_.file().string(), size, source.size()));
+  }
   for (const Field& field : kFields) {
     writer_.append(fmt::format("samples/{}", field.name), (samples.*field.data).data(), size);
   }
   const std::vector<std::int32_t> row(static_cast<std::size_t>(size),
                                       static_cast<std::int32_t>(records_.size()));
   writer_.append("samples/trajectory", row.data(), size);
+  writer_.append("samples/source", source.data(), size);
   records_.push_back(record);
   samples_ += size;
 }
@@ -117,6 +126,13 @@ Dataset read_dataset(const std::filesystem::path& file) {
   for (const Field& field : kFields) {
     dataset.samples.*field.data = reader.read<double>(fmt::format("samples/{}", field.name),
                                                       {samples, 3, 3}, hdf5::Values::finite);
+  }
+  if (reader.has("samples/source")) {
+    dataset.samples.source = reader.read<std::int32_t>("samples/source", {samples});
+    for (const std::int32_t source : dataset.samples.source) {
+      if (source == kSimulatedSample || source == kDrawnSample) continue;
+      reader.fail("/samples/source", fmt::format("expected 0 or 1, found {}", source));
+    }
   }
   dataset.first.assign(static_cast<std::size_t>(count) + 1, 0);
   std::int32_t before = 0;

@@ -8,6 +8,8 @@
 //   /samples/C       [S, 3, 3]  1/s  affine velocity
 //   /samples/tau     [S, 3, 3]  Pa   Kirchhoff stress of (F_proj, C)
 //   /samples/trajectory [S]     1    row of /trajectories, not decreasing
+//   /samples/source     [S]     1    0: state of a simulation, 1: state drawn at random and put to
+//                                    the law; a file without it holds simulated states only
 //   /trajectories/material   [N]     name of the law
 //   /trajectories/parameters [N, 5]  mu (Pa), lambda (Pa), tau_y (Pa), theta (rad), eta (Pa s);
 //                                    NaN where the law has none
@@ -45,12 +47,17 @@ struct TrajectoryRecord {
   std::string shape;
 };
 
+/// Values of /samples/source.
+inline constexpr std::int32_t kSimulatedSample = 0;
+inline constexpr std::int32_t kDrawnSample = 1;
+
 /// Samples of one or many trajectories; all arrays [samples, 3, 3], row-major.
 struct LawSamples {
   std::vector<double> F;
   std::vector<double> F_proj;
   std::vector<double> C;
   std::vector<double> tau;
+  std::vector<std::int32_t> source;  ///< [samples], or empty where all are simulated
 
   std::int64_t size() const { return static_cast<std::int64_t>(F.size() / 9); }
 };

@@ -1,0 +1,102 @@
+#include "uniphy/data/dataset_metrics.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "uniphy/data/law_branches.hpp"
+
+namespace uniphy {
+namespace {
+
+constexpr double kLargeAffine = 10;  ///< 1/s
+
+double norm9(const double* m) {
+  double square = 0;
+  for (int k = 0; k < 9; ++k) square += m[k] * m[k];
+  return std::sqrt(square);
+}
+
+bool is_yielding(const std::string& branch) {
+  return branch == "yield" || branch == "yield_near" || branch == "apex";
+}
+
+double quantile(const std::vector<double>& sorted, double share) {
+  return sorted[static_cast<std::size_t>(share * static_cast<double>(sorted.size() - 1))];
+}
+
+std::int64_t sum(const std::vector<std::int64_t>& counts) {
+  return std::accumulate(counts.begin(), counts.end(), std::int64_t{0});
+}
+
+double ratio(std::int64_t part, std::int64_t whole) {
+  return whole == 0 ? 0 : static_cast<double>(part) / static_cast<double>(whole);
+}
+
+}  // namespace
+
+DatasetMetrics::DatasetMetrics(const GenerateOptions& options) : dt_(options.dt.value_or(0)) {
+  for (const MaterialRanges& ranges : options.materials) {
+    Material material;
+    material.id = ranges.id;
+    material.simulated.assign(branch_names(ranges.id).size(), 0);
+    material.drawn = material.simulated;
+    materials_.push_back(std::move(material));
+  }
+}
+
+void DatasetMetrics::add(const TrajectorySetup& setup, const TrajectoryPart& part) {
+  const auto at = std::find_if(materials_.begin(), materials_.end(),
+                               [&](const Material& m) { return m.id == setup.law.id; });
+  Material& material = *at;
+  const auto& names = branch_names(material.id);
+  const auto features = sample_features(setup.law, part.samples);
+  bool yields = false;
+  for (std::size_t s = 0; s < features.size(); ++s) {
+    const auto branch = static_cast<std::size_t>(features[s].branch);
+    const bool simulated = part.samples.source[s] == kSimulatedSample;
+    ++(simulated ? material.simulated : material.drawn)[branch];
+    yields = yields || (simulated && is_yielding(names[branch]));
+    material.strains.push_back(features[s].strain);
+    if (norm9(&part.samples.C[9 * s]) > kLargeAffine) ++material.large_affine;
+  }
+  ++material.trajectories;
+  material.yielding += yields ? 1 : 0;
+  material.failed += static_cast<std::int64_t>(part.failures.size());
+  if (setup.grid.dt < dt_) ++dt_lowered_;
+}
+
+void DatasetMetrics::write(Metrics& metrics) const {
+  std::int64_t trajectories = 0, samples = 0;
+  for (const Material& m : materials_) {
+    trajectories += m.trajectories;
+    samples += sum(m.simulated) + sum(m.drawn);
+  }
+  metrics.set("trajectories", static_cast<double>(trajectories));
+  metrics.set("samples", static_cast<double>(samples));
+  metrics.set("dt_lowered", static_cast<double>(dt_lowered_));
+  for (const Material& m : materials_) {
+    const std::string name = kernels::law_name(m.id);
+    const auto& branches = branch_names(m.id);
+    const std::int64_t simulated = sum(m.simulated), all = simulated + sum(m.drawn);
+    metrics.set("failed." + name, static_cast<double>(m.failed));
+    metrics.set("simulated." + name, static_cast<double>(simulated));
+    metrics.set("drawn." + name, static_cast<double>(all - simulated));
+    if (std::any_of(branches.begin(), branches.end(), is_yielding)) {
+      metrics.set("yielding." + name, ratio(m.yielding, m.trajectories));
+    }
+    for (std::size_t b = 0; b < branches.size(); ++b) {
+      metrics.set("share." + name + "." + branches[b], ratio(m.simulated[b] + m.drawn[b], all));
+      metrics.set("share_simulated." + name + "." + branches[b], ratio(m.simulated[b], simulated));
+    }
+    metrics.set("large_affine." + name, ratio(m.large_affine, all));
+    std::vector<double> strains = m.strains;
+    if (strains.empty()) continue;
+    std::sort(strains.begin(), strains.end());
+    metrics.set("strain_low." + name, quantile(strains, 0.01));
+    metrics.set("strain_median." + name, quantile(strains, 0.5));
+    metrics.set("strain_high." + name, quantile(strains, 0.99));
+  }
+}
+
+}  // namespace uniphy

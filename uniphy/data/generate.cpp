@@ -1,0 +1,125 @@
+#include "uniphy/data/generate.hpp"
+
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <exception>
+
+#include "ops/kernels/error.hpp"
+#include "uniphy/data/dataset_metrics.hpp"
+#include "uniphy/data/part_file.hpp"
+#include "uniphy/data/random_streams.hpp"
+#include "uniphy/data/simulate_samples.hpp"
+#include "uniphy/io/atomic_file.hpp"
+#include "uniphy/report/progress.hpp"
+
+namespace uniphy {
+namespace {
+
+/// FNV-1a: the same on every platform.
+std::uint64_t hash_text(const std::string& text) {
+  std::uint64_t hash = 0xcbf29ce484222325ULL;
+  for (const char c : text) {
+    hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3ULL;
+  }
+  return hash;
+}
+
+std::string describe(const TrajectorySetup& setup) {
+  std::string text = setup.record.material;
+  for (const std::string& name : kernels::parameter_names(setup.law.id)) {
+    for (std::size_t k = 0; k < kParameterNames.size(); ++k) {
+      if (name != kParameterNames[k]) continue;
+      text += fmt::format(", {} {:.4g}", name, setup.record.parameters[k]);
+    }
+  }
+  return fmt::format("{}, {} {}", text, setup.motion, setup.record.shape);
+}
+
+TrajectoryPart make_trajectory(const GenerateOptions& options, std::int64_t trajectory) {
+  TrajectoryPart part;
+  for (; part.attempt < options.attempts; ++part.attempt) {
+    const TrajectorySetup setup = draw_setup(options, trajectory, part.attempt);
+    try {
+      part.samples = trajectory_samples(
+          options, setup,
+          stream_seed(scramble(options.seed) ^ static_cast<std::uint64_t>(options.split),
+                      Stream::sampling, static_cast<std::uint64_t>(trajectory),
+                      static_cast<std::uint64_t>(part.attempt)));
+      return part;
+    } catch (const Error& error) {
+      part.failures.push_back(fmt::format("{}: {}", describe(setup), error.what()));
+    }
+  }
+  throw Error(fmt::format("trajectory {} of {}: all {} attempts failed, the last one: {}",
+                          trajectory, options.total(), options.attempts, part.failures.back()));
+}
+
+/// Runs what has no part yet, one trajectory a thread.
+void make_parts(const GenerateOptions& options, const std::filesystem::path& directory) {
+  const std::int64_t total = options.total();
+  std::vector<std::int64_t> open;
+  for (std::int64_t i = 0; i < total; ++i) {
+    if (!std::filesystem::exists(part_path(directory, i))) open.push_back(i);
+  }
+  std::int64_t done = total - static_cast<std::int64_t>(open.size());
+  Progress progress("generate", total, "trajectories");
+  std::exception_ptr failure;
+#pragma omp parallel for schedule(dynamic, 1)
+  for (std::size_t k = 0; k < open.size(); ++k) {
+    bool stop;
+#pragma omp critical(uniphy_generate)
+    stop = failure != nullptr;
+    if (stop) continue;
+    try {
+      const TrajectoryPart part = make_trajectory(options, open[k]);
+      // HDF5 serves one thread at a time. An exception must not leave the critical section.
+      std::exception_ptr thrown;
+#pragma omp critical(uniphy_generate)
+      try {
+        for (const std::string& reason : part.failures) {
+          std::fprintf(stderr, "left out: trajectory %lld: %s\n", static_cast<long long>(open[k]),
+                       reason.c_str());
+        }
+        write_part(part_path(directory, open[k]), part);
+        progress.update(++done);
+      } catch (...) {
+        thrown = std::current_exception();
+      }
+      if (thrown) std::rethrow_exception(thrown);
+    } catch (...) {
+#pragma omp critical(uniphy_generate)
+      if (!failure) failure = std::current_exception();
+    }
+  }
+  progress.finish();
+  if (failure) std::rethrow_exception(failure);
+}
+
+}  // namespace
+
+void generate_dataset(const GenerateOptions& options, const std::string& config_yaml,
+                      const std::filesystem::path& file, Metrics& metrics) {
+  std::filesystem::path parts = file;
+  parts += fmt::format(".parts-{:016x}", hash_text(config_yaml));
+  make_directory(parts);
+  make_parts(options, parts);
+
+  DatasetWriter writer(file, config_yaml);
+  DatasetMetrics collected(options);
+  for (std::int64_t i = 0; i < options.total(); ++i) {
+    const auto part = read_part(part_path(parts, i));
+    if (!part) {
+      throw Error(fmt::format("{}: removed while the data set was generated",
+                              part_path(parts, i).string()));
+    }
+    const TrajectorySetup setup = draw_setup(options, i, part->attempt);
+    writer.append(setup.record, part->samples);
+    collected.add(setup, *part);
+  }
+  writer.finish();
+  collected.write(metrics);
+  std::filesystem::remove_all(parts);
+}
+
+}  // namespace uniphy

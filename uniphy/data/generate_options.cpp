@@ -1,0 +1,154 @@
+#include "uniphy/data/generate_options.hpp"
+
+#include <map>
+
+#include "uniphy/geometry/shape_catalogue.hpp"
+
+namespace uniphy {
+namespace {
+
+using kernels::LawId;
+
+const std::map<std::string, std::string>& parameter_docs() {
+  static const std::map<std::string, std::string> docs{
+      {"mu", "shear modulus (newtonian: viscosity, Pa s)"},
+      {"lambda", "first Lamé parameter"},
+      {"tau_y", "yield stress"},
+      {"theta", "friction angle"},
+      {"eta", "plastic viscosity"}};
+  return docs;
+}
+
+std::string unit_of(const std::string& parameter) {
+  if (parameter == "theta") return "rad";
+  return parameter == "eta" ? "Pa s" : "Pa";
+}
+
+void read_materials(Section& config, GenerateOptions& options) {
+  std::vector<std::string> names;
+  for (const MaterialRanges& ranges : default_material_ranges()) names.push_back(ranges.name());
+  const std::vector<std::string> chosen =
+      config.choices("materials", names, names, "materials of the data set", at_least(1));
+
+  Section all = config.section("ranges", "parameters are drawn log-uniformly, theta uniformly");
+  std::vector<MaterialRanges> read;
+  for (MaterialRanges ranges : default_material_ranges()) {
+    Section section = all.section(ranges.name(), "");
+    for (const std::string& parameter : kernels::parameter_names(ranges.id)) {
+      for (std::size_t k = 0; k < kParameterNames.size(); ++k) {
+        if (parameter != kParameterNames[k]) continue;
+        Range range = positive();
+        if (parameter == "theta") range.high = 1.5;
+        ranges.interval[k] = section.interval(parameter, ranges.interval[k], range,
+                                              unit_of(parameter), parameter_docs().at(parameter));
+      }
+    }
+    read.push_back(ranges);
+  }
+  options.materials.clear();
+  for (const std::string& name : chosen) {
+    for (const MaterialRanges& ranges : read) {
+      if (ranges.name() == name) options.materials.push_back(ranges);
+    }
+  }
+}
+
+void read_simulation(Section& config, GenerateOptions& o) {
+  Section s = config.section("simulation", "the same for all trajectories");
+  o.grid.n = static_cast<int>(s.integer("grid", 20, between(10, 256), "", "nodes a side"));
+  o.grid.bound =
+      static_cast<int>(s.integer("bound", 3, between(2, 32), "", "thickness of the walls, nodes"));
+  if (2 * o.grid.bound >= o.grid.n / 2 && !s.describing()) {
+    s.fail("bound", "expected walls that leave half of the grid free, found " +
+                        std::to_string(o.grid.bound) + " of " + std::to_string(o.grid.n) +
+                        " nodes on each side");
+  }
+  const std::string wall =
+      s.choice("wall", "freeslip", {"freeslip", "noslip"}, "what the walls do");
+  o.grid.wall = wall == "noslip" ? kernels::Wall::noslip : kernels::Wall::freeslip;
+  const auto gravity = s.vector3("gravity", std::array<double, 3>{0, -9.8, 0}, between(-100, 100),
+                                 "m/s^2", "acceleration");
+  for (std::size_t i = 0; i < 3; ++i) o.grid.gravity[i] = gravity[i];
+  o.steps = s.integer("steps", 2000, between(10, 1000000), "", "steps of every trajectory");
+  o.dt = s.real_or("auto", "dt", std::optional<double>(1.0 / 4800), between(1e-7, 1e-2), "s",
+                   "time step; auto: from stiffness and viscosity. The law of non_newtonian holds "
+                   "it, so a learned law is right for the step of its data set. A fixed step is "
+                   "lowered for single trajectories that would not be stable");
+  o.particles = s.integer("particles", 500, between(8, 1000000), "",
+                          "about so many in a body (a lattice cannot meet every number)");
+  o.density = s.real("density", 1000, between(1, 1e5), "kg/m^3", "mass density");
+}
+
+void read_bodies(Section& config, GenerateOptions& o) {
+  Section s = config.section("body", "one body a trajectory");
+  o.shapes =
+      s.choices("shapes",
+                std::vector<std::string>{"box", "capped_cone", "cylinder", "ellipsoid",
+                                         "octahedron", "pyramid", "rounded_box", "sphere", "torus"},
+                shape_names(), "shapes of train and heldout_materials", at_least(1));
+  o.heldout_shapes = s.choices("heldout_shapes",
+                               std::vector<std::string>{"blobby", "dodecahedron", "gear",
+                                                        "knurling", "pawn", "rounded_cone", "toy"},
+                               shape_names(), "shapes of heldout_all", at_least(1));
+  o.size = s.interval("size", o.size, between(0.01, 0.6), "m", "largest side before the rotation");
+
+  Section m = config.section("motion", "where bodies start and how they move");
+  o.motions = m.choices("kinds", o.motions, o.motions,
+                        "falling, left, right, diagonal (towards an edge of the floor), random",
+                        at_least(1));
+  o.speed = m.interval("speed", o.speed, between(0.01, 50), "m/s",
+                       "log-uniform where the material does not yield");
+  o.impact_over_yield =
+      m.interval("impact_over_yield", o.impact_over_yield, between(0.01, 1000), "",
+                 "where it can yield: strain of the impact (speed over wave speed) over the yield "
+                 "strain, log-uniform; the speed stays within `speed`");
+  o.gap = m.interval("gap", o.gap, between(0, 0.5), "m",
+                     "distance to the walls ahead (falling: drop height); less for slow bodies, so "
+                     "that all of them arrive");
+  o.angular_speed = m.interval("angular_speed", o.angular_speed, between(0, 200), "rad/s",
+                               "about a random axis, for every second body");
+}
+
+void read_samples(Section& config, GenerateOptions& o) {
+  Section s = config.section("samples", "what is kept of a trajectory");
+  o.samples = s.integer("per_trajectory", 1000, between(10, 1000000), "", "number of samples");
+  o.every = s.integer("every", 10, between(1, 100000), "", "steps between two looks");
+  o.uniform_share = s.real("uniform_share", 0.25, between(0, 1), "",
+                           "part of the simulated samples taken as they come; the others are "
+                           "spread over branches of the law, strains and rates");
+  Section d = s.section("drawn",
+                        "states drawn at random and put to the analytic law, for branches "
+                        "and strains that the trajectory does not reach");
+  o.drawn_share = d.real("share", 0.25, between(0, 1), "", "part of the samples");
+  o.drawn_strain = d.real("strain", 0.5, between(0.001, 1), "", "largest Hencky strain");
+  o.drawn_beyond = d.real("beyond", 3, at_least(1), "",
+                          "strains reach this times what the trajectory saw (yield surfaces are "
+                          "visited up to `strain` even so)");
+  o.drawn_affine = d.interval("affine", o.drawn_affine, positive(), "1/s",
+                              "norm of the affine velocity, log-uniform");
+}
+
+}  // namespace
+
+GenerateOptions read_generate_options(Section& config) {
+  GenerateOptions o;
+  o.seed = static_cast<std::uint64_t>(
+      config.integer("seed", 1, between(0, 9e15), "", "everything random follows from it"));
+  const std::string split =
+      config.choice("split", "train", {"train", "heldout_materials", "heldout_all"},
+                    "heldout_materials: new parameters; heldout_all: new shapes and motions too");
+  o.split = split == "train"               ? Split::train
+            : split == "heldout_materials" ? Split::heldout_materials
+                                           : Split::heldout_all;
+  o.trajectories =
+      config.integer("trajectories", 40, between(1, 100000), "", "trajectories of each material");
+  o.attempts = config.integer("attempts", 20, between(1, 1000), "",
+                              "draws for one trajectory: a run that fails is replaced");
+  read_materials(config, o);
+  read_simulation(config, o);
+  read_bodies(config, o);
+  read_samples(config, o);
+  return o;
+}
+
+}  // namespace uniphy

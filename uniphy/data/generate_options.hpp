@@ -1,0 +1,67 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "ops/kernels/grid.hpp"
+#include "uniphy/config/config.hpp"
+#include "uniphy/data/material_ranges.hpp"
+
+namespace uniphy {
+
+/// Which set is drawn. A seed gives three sets that share no material.
+enum class Split {
+  train,
+  heldout_materials,  ///< new parameters; shapes and motions those of train
+  heldout_all         ///< new parameters, motions, and shapes that train never uses
+};
+
+/// How a data set is drawn; the defaults are those of the keys (read_generate_options).
+struct GenerateOptions {
+  std::uint64_t seed = 1;
+  Split split = Split::train;
+  std::int64_t trajectories = 40;  ///< per material
+  std::int64_t attempts = 20;      ///< draws for one trajectory before generation gives up
+  std::vector<MaterialRanges> materials = default_material_ranges();
+
+  // simulation
+  kernels::GridSettings grid;  ///< grid.dt is set for each trajectory
+  std::int64_t steps = 2000;
+  std::optional<double> dt = 1.0 / 4800;  ///< s; none: from the stiffness
+  std::int64_t particles = 500;           ///< about so many, see fill_lattice_nearest
+  double density = 1000;                  ///< kg/m^3
+
+  // body
+  std::vector<std::string> shapes, heldout_shapes;
+  std::array<double, 2> size{0.2, 0.32};  ///< largest side, m
+
+  // motion
+  std::vector<std::string> motions{"falling", "left", "right", "diagonal", "random"};
+  std::array<double, 2> speed{0.3, 5};         ///< m/s
+  std::array<double, 2> gap{0, 0.15};          ///< to the walls ahead, m
+  std::array<double, 2> angular_speed{0, 10};  ///< rad/s
+  std::array<double, 2> impact_over_yield{0.7, 6};
+
+  // samples
+  std::int64_t samples = 1000;  ///< per trajectory
+  std::int64_t every = 10;      ///< steps between two looks at the particles
+  double uniform_share = 0.25;
+  double drawn_share = 0.25;
+  double drawn_strain = 0.5;  ///< largest
+  double drawn_beyond = 3;
+  std::array<double, 2> drawn_affine{0.1, 100};  ///< 1/s
+
+  std::int64_t total() const { return trajectories * static_cast<std::int64_t>(materials.size()); }
+  /// The material of a trajectory: all of one material stand together.
+  const MaterialRanges& material_of(std::int64_t trajectory) const {
+    return materials[static_cast<std::size_t>(trajectory / trajectories)];
+  }
+};
+
+/// Declares and reads all keys of uniphy_generate.
+GenerateOptions read_generate_options(Section& config);
+
+}  // namespace uniphy
