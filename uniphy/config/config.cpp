@@ -1,6 +1,7 @@
 #include "uniphy/config/config.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 

@@ -88,7 +88,8 @@ class TreeBuilder : public YAML::EventHandler {
     if (!tag.empty() && tag != "?" && tag != "!") {
       fail_at(at(mark), fmt::format("YAML tags are not supported, found \"{}\"", tag));
     }
-    if (expects_key()) fail_at(at(mark), "expected a plain key, found a list or a map");
+    if (expects_key())
+      fail_at(at(mark), "expected a plain key, found a list or a map; is a bracket left open?");
     if (++count_ > kMaximumNodes) {
       fail_at(at(mark), fmt::format("expected at most {} values", kMaximumNodes));
     }

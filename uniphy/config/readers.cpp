@@ -1,6 +1,7 @@
 // The readers of single values and of lists of values.
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>

@@ -21,7 +21,7 @@ struct Default {
   Default(Required) {}  // NOLINT(google-explicit-constructor)
   template <class U, class = std::enable_if_t<std::is_convertible_v<U, T>>>
   Default(U&& value_in)
-      : value(std::forward<U>(value_in)) {}  // NOLINT(google-explicit-constructor)
+      : value(std::in_place, std::forward<U>(value_in)) {}  // NOLINT(google-explicit-constructor)
 };
 
 /// The values a number may take. Infinities and NaN are never accepted unless `infinite` is set

@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "uniphy/io/hdf5_handle.hpp"
 

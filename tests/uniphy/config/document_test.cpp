@@ -1,0 +1,106 @@
+#include "uniphy/config/document.hpp"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+
+#include "tests/uniphy/support/scratch.hpp"
+
+namespace uniphy {
+namespace {
+
+TEST(Document, KeepsOrderLinesAndQuotes) {
+  const auto root =
+      parse_document("b: 1\na:\n  - x\n  - \"2\"\nc:\n  d: ~\n  e: |\n    text\n", "f");
+  ASSERT_EQ(root->entries.size(), 3u);
+  EXPECT_EQ(root->entries[0].first, "b");
+  EXPECT_EQ(root->find("b")->origin, "f:1");
+  const auto list = root->find("a");
+  ASSERT_EQ(list->items.size(), 2u);
+  EXPECT_FALSE(list->items[0]->quoted);
+  EXPECT_TRUE(list->items[1]->quoted);
+  EXPECT_EQ(list->items[1]->origin, "f:4");
+  EXPECT_EQ(root->find("c")->find("d")->kind, Node::Kind::null);
+  EXPECT_EQ(root->find("c")->find("e")->text, "text\n");
+}
+
+TEST(Document, EmptyTextIsAnEmptyMap) {
+  for (const char* text : {"", "\n\n", "# only a comment\n", "---\n"}) {
+    const auto root = parse_document(text, "f");
+    EXPECT_EQ(root->kind, Node::Kind::map) << text;
+    EXPECT_TRUE(root->entries.empty()) << text;
+  }
+}
+
+TEST(Document, WindowsLineEndsAndByteOrderMarkPass) {
+  const auto root = parse_document(
+      "\xEF\xBB\xBF"
+      "a: 1\r\nb: caf\xC3\xA9\r\n",
+      "f");
+  EXPECT_EQ(root->find("a")->text, "1");
+  EXPECT_EQ(root->find("b")->text, "caf\xC3\xA9");
+}
+
+TEST(Document, EmittedTextReadsBackToTheSameTree) {
+  const char* text =
+      "empty: {}\nnone: null\nword: abc\nnumber_text: \"12\"\nlooks_null: \"null\"\n"
+      "hard: \"a: b # c \\\"d\\\" \\\\ \\n e\"\ndash: \"-\"\nblank: \"\"\n"
+      "list: [1, .inf, -2.5e-3, \"true\"]\nnested:\n  - name: a\n    inner:\n      - [1, 2]\n"
+      "      - [3]\n  - name: b\n  - {}\n\"odd key\": 1\n";
+  const auto once = parse_document(text, "f");
+  const std::string emitted = emit_document(*once);
+  const auto twice = parse_document(emitted, "f");
+  EXPECT_EQ(emit_document(*twice), emitted);
+  EXPECT_EQ(twice->find("hard")->text, "a: b # c \"d\" \\ \n e");
+  EXPECT_TRUE(twice->find("number_text")->quoted);
+  EXPECT_TRUE(twice->find("looks_null")->quoted);
+  EXPECT_EQ(twice->find("none")->kind, Node::Kind::null);
+  EXPECT_EQ(twice->find("nested")->items[0]->find("inner")->items[1]->items[0]->text, "3");
+  EXPECT_EQ(twice->find("nested")->items[2]->kind, Node::Kind::map);
+  EXPECT_EQ(twice->find("odd key")->text, "1");
+}
+
+TEST(Override, SetsReplacesAndAppends) {
+  const auto root = parse_document("scene: {grid: 20}\nbodies:\n  - density: 1\n", "f");
+  apply_override(*root, "scene.grid=32");
+  apply_override(*root, "scene.gravity=[0, -1, 0]");
+  apply_override(*root, "bodies.0.density=500");
+  apply_override(*root, "bodies.1.density=600");
+  apply_override(*root, "new.deep.key={a: 1}");
+  apply_override(*root, "text=a=b");
+  apply_override(*root, "nothing=");
+  EXPECT_EQ(root->find("scene")->find("grid")->text, "32");
+  EXPECT_EQ(root->find("scene")->find("grid")->origin, "--set scene.grid=32");
+  EXPECT_EQ(root->find("scene")->find("gravity")->items[1]->text, "-1");
+  EXPECT_EQ(root->find("bodies")->items[0]->find("density")->text, "500");
+  EXPECT_EQ(root->find("bodies")->items[1]->find("density")->text, "600");
+  EXPECT_EQ(root->find("new")->find("deep")->find("key")->find("a")->text, "1");
+  EXPECT_EQ(root->find("text")->text, "a=b");
+  EXPECT_EQ(root->find("nothing")->kind, Node::Kind::null);
+}
+
+TEST(Document, HostileDocumentsAreRefusedQuickly) {
+  const auto start = std::chrono::steady_clock::now();
+  std::string laughs = "a0: &a0 [x, x, x, x, x, x, x, x, x]\n";
+  for (int i = 1; i < 12; ++i) {
+    laughs += "a" + std::to_string(i) + ": &a" + std::to_string(i) + " [*a, *a, *a]\n";
+  }
+  EXPECT_NE(testing::error_of([&] { parse_document(laughs, "f"); }).find("f:1: YAML anchors"),
+            std::string::npos);
+  for (const char* opening : {"[", "{a: ", "- ", "? ", "a: [", "!!x "}) {
+    std::string deep;
+    while (deep.size() < kMaximumBytes / 2) deep += opening;
+    EXPECT_FALSE(testing::error_of([&] { parse_document(deep, "f"); }).empty());
+  }
+  std::string wide = "a: [";
+  while (wide.size() < kMaximumBytes - 10) wide += "1,";
+  EXPECT_NE(testing::error_of([&] {
+              parse_document(wide + "1]", "f");
+            }).find("expected at most 100000 values"),
+            std::string::npos);
+  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
+  EXPECT_LT(elapsed.count(), 20);
+}
+
+}  // namespace
+}  // namespace uniphy
