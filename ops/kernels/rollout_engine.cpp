@@ -8,6 +8,7 @@
 #include <string>
 
 #include "ops/kernels/error.hpp"
+#include "ops/kernels/team_barrier.hpp"
 
 namespace uniphy::kernels {
 namespace {
@@ -120,6 +121,7 @@ void RolloutEngine<T>::advance(std::ptrdiff_t first_step, std::ptrdiff_t steps) 
   // Set by one thread between two barriers, read by all after them.
   bool lost = false;
   std::ptrdiff_t done = 0;
+  TeamBarrier barrier;
 #pragma omp parallel num_threads(threads())
   {
     const int part = omp_get_thread_num(), parts = omp_get_num_threads();
@@ -128,7 +130,7 @@ void RolloutEngine<T>::advance(std::ptrdiff_t first_step, std::ptrdiff_t steps) 
       begin_step(c, 0);
     });
     for (std::ptrdiff_t s = 0; s < steps; ++s) {
-#pragma omp barrier
+      barrier.wait(parts);
       if (part == 0) {
         done = s;
         for (int c = 0; c < chunks(); ++c) lost = lost || transfer_[c].bad >= 0;
@@ -140,15 +142,16 @@ void RolloutEngine<T>::advance(std::ptrdiff_t first_step, std::ptrdiff_t steps) 
           }
         }
       }
-#pragma omp barrier
+      barrier.wait(parts);
       if (lost) break;
       transfer_layers(s, part, parts);
-#pragma omp barrier
+      barrier.wait(parts);
       for_chunks(part, parts, [&](int c) {
         end_step(c, s);
         if (s + 1 < steps) begin_step(c, s + 1);
       });
     }
+    barrier.wait(parts);  // so that nobody waits in the barrier of libgomp
   }
   kept_steps_ = lost ? done : steps;
   throw_if_lost(first_step + kept_steps_);

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "ops/kernels/rollout_engine.hpp"
+#include "ops/kernels/team_barrier.hpp"
 
 namespace uniphy::kernels {
 
@@ -93,6 +94,7 @@ void RolloutEngine<T>::backward(ParticleState<T>& grad, std::ptrdiff_t first_ste
   order_.load(grad.C.data(), 9, grads_.data() + kPlaneC * kChunk, kStateChunkSize);
   order_.load(grad.F.data(), 9, grads_.data() + kPlaneF * kChunk, kStateChunkSize);
 
+  TeamBarrier barrier;
 #pragma omp parallel num_threads(threads())
   {
     const int part = omp_get_thread_num(), parts = omp_get_num_threads();
@@ -100,9 +102,9 @@ void RolloutEngine<T>::backward(ParticleState<T>& grad, std::ptrdiff_t first_ste
       for_chunks(part, parts, [&](int c) { begin_backward_step(c, kept_steps_ - 1); });
     }
     for (std::ptrdiff_t s = kept_steps_ - 1; s >= 0; --s) {
-#pragma omp barrier
+      barrier.wait(parts);
       transfer_layers_backward(s, part, parts);
-#pragma omp barrier
+      barrier.wait(parts);
       const std::ptrdiff_t step = first_step + s, frame = step / frames.every;
       const std::ptrdiff_t at = frame * 3 * order_.particles();
       const bool is_frame = step % frames.every == 0;
@@ -113,6 +115,7 @@ void RolloutEngine<T>::backward(ParticleState<T>& grad, std::ptrdiff_t first_ste
         if (s > 0) begin_backward_step(c, s - 1);
       });
     }
+    barrier.wait(parts);
   }
 
   order_.store(grads_.data() + kPlaneX * kChunk, kStateChunkSize, 3, grad.x.data());
