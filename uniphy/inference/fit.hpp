@@ -1,0 +1,102 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "uniphy/inference/motion_objective.hpp"
+#include "uniphy/inference/optimizer.hpp"
+#include "uniphy/inference/unknowns.hpp"
+
+namespace uniphy {
+
+/// One stage of the schedule: `candidates` points, each improved by `epochs` roll-outs with their
+/// gradients, compared up to the horizon.
+struct FitStage {
+  double horizon = 1;  ///< share of the time from first contact to the last frame, (0, 1]
+  int candidates = 1;
+  int epochs = 20;
+  std::string optimizer = "bfgs";
+  double rate = 0.1;  ///< see OptimizerOptions, in units of the spread of the training codes
+};
+
+struct FitOptions {
+  std::string dtype = "float32";
+  int velocity_frames = 1;       ///< frames after the first that the initial velocity is taken from
+  bool refine_velocity = false;  ///< the last stage also fits the initial velocity
+  double prior = 0;              ///< weight of ‖z‖²/σ² against mse/size²
+  double prior_sigma = 1;        ///< σ
+  double clip = 10;
+  std::vector<FitStage> stages;  ///< the last one has horizon 1
+};
+
+/// A point that is being improved.
+struct FitCandidate {
+  int start = 0;          ///< row of the starts
+  std::vector<double> u;  ///< best so far in this stage, or where the stage starts
+  RigidMotion motion;     ///< likewise
+  double loss = 0;        ///< of that point: mse/size² and the prior
+  double mse = 0;         ///< m²
+};
+
+/// Everything that a fit depends on between two evaluations.
+struct FitState {
+  int stage = -1;                 ///< −1: the starts are not ranked yet
+  int epoch = 0;                  ///< next one within the stage
+  std::vector<double> start_mse;  ///< [starts, stages] of every start at the stages' horizons
+  std::vector<FitCandidate> candidates;
+  std::vector<std::vector<double>> optimizers;  ///< [candidates] packed; empty between stages
+  std::vector<FitRecord> history;
+};
+
+struct FitResult {
+  kernels::LawDescription law;
+  std::vector<double> u;
+  RigidMotion motion;             ///< initial velocity that was used
+  double mse = 0;                 ///< m², over all frames
+  int start = 0;                  ///< the start that it comes from
+  std::vector<double> start_mse;  ///< [starts] over all frames, infinite where the roll-out failed
+  std::vector<FitRecord> history;
+  std::ptrdiff_t contact = 0;  ///< first frame at which a wall acts
+};
+
+struct FitHooks {
+  std::filesystem::path state_file;  ///< where the fit can be taken up again; empty: nowhere
+  std::string fingerprint;           ///< of everything that the fit depends on
+  double save_seconds = 2;           ///< least time between two saves
+  std::function<void(const FitRecord&)> on_record;  ///< after every evaluation
+  bool progress = true;
+};
+
+/// Algorithm 2: finds the law that makes a roll-out follow the observed positions.
+///
+/// 1. Every start is rolled out once over all frames, which gives its loss at each horizon.
+/// 2. The first stage begins with the best start of each material at the first horizon, the best
+///    over all frames, and then the best that keep a distance from those chosen: one start that
+///    fits the first moments may stand for the wrong kind of material and not leave it.
+/// 3. Each stage improves its candidates by gradients; the next one keeps the best at its own,
+///    longer horizon. A candidate whose roll-out fails has infinite loss and goes first.
+/// 4. The best evaluation over all frames is the result.
+///
+/// Candidates are evaluated side by side; results have the same bits for any number of threads.
+/// Throws Error where no start can be simulated up to the first horizon, or where the state file
+/// does not belong to this fit.
+FitResult fit_observation(const Observation& observation, const std::string& name,
+                          const Unknowns& unknowns, const FitOptions& options,
+                          const FitHooks& hooks = {});
+
+/// Number of frames that a stage compares.
+std::ptrdiff_t horizon_frames(double horizon, std::ptrdiff_t contact, std::ptrdiff_t frames);
+
+/// The starts of the first stage, see fit_observation; loss_short and loss_full [starts].
+std::vector<int> choose_starts(const Unknowns& unknowns, const std::vector<double>& loss_short,
+                               const std::vector<double>& loss_full, int count);
+
+/// The state on disk (HDF5, format "uniphy-fit-state"). read throws Error where the file is damaged
+/// or its fingerprint is another.
+void write_fit_state(const std::filesystem::path& file, const FitState& state,
+                     const std::string& fingerprint);
+FitState read_fit_state(const std::filesystem::path& file, const std::string& fingerprint);
+
+}  // namespace uniphy

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <vector>
+
+namespace uniphy {
+
+/// The velocity field of a rigid body, v(x) = linear + angular × (x − centre).
+struct RigidMotion {
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();   ///< m
+  Eigen::Vector3d linear = Eigen::Vector3d::Zero();   ///< m/s
+  Eigen::Vector3d angular = Eigen::Vector3d::Zero();  ///< rad/s
+
+  /// x [particles, 3] → v [particles, 3].
+  std::vector<double> velocities(const std::vector<double>& x) const;
+  /// dL/dv [particles, 3] → dL/d(linear, angular).
+  std::array<double, 6> gradient(const std::vector<double>& x,
+                                 const std::vector<double>& grad_v) const;
+};
+
+}  // namespace uniphy
