@@ -1,0 +1,156 @@
+#include "uniphy/scene/law_config.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "ops/kernels/error.hpp"
+#include "uniphy/io/latent_file.hpp"
+#include "uniphy/io/model_file.hpp"
+
+namespace uniphy {
+namespace {
+
+using kernels::LawDescription;
+using kernels::LawId;
+
+struct Parameter {
+  double LawDescription::*member;
+  Range range;
+  const char* unit;
+  const char* doc;
+};
+
+Parameter parameter(LawId id, const std::string& name) {
+  if (name == "mu") {
+    if (id == LawId::newtonian) {
+      return {&LawDescription::mu, positive(), "Pa s", "dynamic viscosity"};
+    }
+    return {&LawDescription::mu, positive(), "Pa", "shear modulus"};
+  }
+  if (name == "lambda") {
+    return {&LawDescription::lambda, positive(), "Pa",
+            id == LawId::water ? "bulk modulus" : "first Lame parameter"};
+  }
+  if (name == "tau_y") return {&LawDescription::tau_y, at_least(0), "Pa", "yield stress"};
+  if (name == "theta") {
+    return {&LawDescription::theta, Range{0, M_PI / 2, false, true}, "rad", "friction angle"};
+  }
+  return {&LawDescription::eta, at_least(0), "Pa s", "viscosity of the plastic flow"};
+}
+
+void read_learned(Section& law, LawSource* source) {
+  source->model = law.text("model", std::string(),
+                           "model file (model.h5); may be absent where the latent file names it");
+  Section latent = law.section("latent", "the latent code");
+  latent.variant("type", std::string("code"),
+                 {{"code", "one of the codes that the model was trained with",
+                   [&](Section& s) {
+                     source->latent = LawSource::Latent::code;
+                     source->index =
+                         s.integer("index", 0, at_least(0), "", "number of the code, from 0");
+                   }},
+                  {"values", "the numbers themselves",
+                   [&](Section& s) {
+                     source->latent = LawSource::Latent::values;
+                     source->z = s.reals("z", required, any_number(), "", "latent code");
+                   }},
+                  {"fitted", "the result of uniphy_infer",
+                   [&](Section& s) {
+                     source->latent = LawSource::Latent::file;
+                     source->latent_file =
+                         s.text("path", required, "latent.h5, or the output folder that holds it");
+                   }}},
+                 "where the latent code comes from");
+  if (!law.describing() && source->model.empty() && source->latent != LawSource::Latent::file) {
+    law.fail("model", "expected a model file, found nothing");
+  }
+}
+
+void check_length(const LawDescription& law, const std::string& where) {
+  if (law.z.size() == static_cast<std::size_t>(law.weights->latent_size)) return;
+  throw Error(
+      fmt::format("{}: expected a latent code of {} numbers, the size that the model has, "
+                  "found {}",
+                  where, law.weights->latent_size, law.z.size()));
+}
+
+// The model named by a latent file was written as the run that made it saw it: a path from its
+// working directory.
+std::filesystem::path find_model(const std::filesystem::path& latent, const std::string& named) {
+  const std::filesystem::path folder = latent.parent_path();
+  for (const std::filesystem::path& candidate :
+       {std::filesystem::path(named), folder / named, folder / "model.h5"}) {
+    if (!candidate.empty() && std::filesystem::is_regular_file(candidate)) return candidate;
+  }
+  throw Error(
+      fmt::format("{}: its model \"{}\" was not found here, nor in {}: expected the key "
+                  "model to name it",
+                  latent.string(), named, folder.empty() ? "." : folder.string()));
+}
+
+}  // namespace
+
+LawSource read_law(Section& law) {
+  LawSource source;
+  std::vector<Variant> variants;
+  const char* docs[] = {"neo-Hookean solid",
+                        "weakly compressible viscous fluid",
+                        "elastoplastic, von Mises yield",
+                        "elastoplastic, Drucker-Prager yield",
+                        "viscoplastic, von Mises yield",
+                        "fixed-corotated elastic solid",
+                        "inviscid weakly compressible fluid",
+                        "a trained model with a latent code"};
+  for (int i = 0; i <= static_cast<int>(LawId::learned); ++i) {
+    const LawId id = static_cast<LawId>(i);
+    variants.push_back({kernels::law_name(id), docs[i], [&source, id](Section& s) {
+                          source.description.id = id;
+                          for (const std::string& name : kernels::parameter_names(id)) {
+                            const Parameter p = parameter(id, name);
+                            source.description.*p.member =
+                                s.real(name, required, p.range, p.unit, p.doc);
+                          }
+                          if (id == LawId::learned) read_learned(s, &source);
+                        }});
+  }
+  law.variant("type", required, variants, "the constitutive law");
+  return source;
+}
+
+LawDescription LawSource::load() const {
+  if (description.id != LawId::learned) return description;
+  if (latent == Latent::file) return load_fitted_law(latent_file, model);
+  const ModelFile file = read_model(model);
+  LawDescription law = description;
+  law.weights = std::make_shared<kernels::LearnedLawWeights>(file.weights);
+  if (latent == Latent::code) {
+    if (index >= file.codes()) {
+      throw Error(
+          fmt::format("{}: latent.index: expected 0 to {}, the codes of the model, found {}",
+                      model.string(), file.codes() - 1, index));
+    }
+    law.z = file.code(index);
+  } else {
+    law.z = z;
+  }
+  check_length(law, model.string());
+  return law;
+}
+
+LawDescription load_fitted_law(const std::filesystem::path& latent,
+                               const std::filesystem::path& model) {
+  const std::filesystem::path file =
+      std::filesystem::is_directory(latent) ? latent / "latent.h5" : latent;
+  const LatentFile fitted = read_latent(file);
+  if (fitted.law != kernels::law_name(LawId::learned)) return fitted.analytic;
+  const std::filesystem::path found = model.empty() ? find_model(file, fitted.model) : model;
+  LawDescription law;
+  law.id = LawId::learned;
+  law.weights = std::make_shared<kernels::LearnedLawWeights>(read_model(found).weights);
+  law.z = fitted.z;
+  check_length(law, file.string());
+  return law;
+}
+
+}  // namespace uniphy

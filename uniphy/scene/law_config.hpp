@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "ops/kernels/law.hpp"
+#include "uniphy/config/config.hpp"
+
+namespace uniphy {
+
+/// A law as a configuration names it. Files are opened by load(), not while keys are read.
+struct LawSource {
+  /// Where the latent code of a learned law comes from.
+  enum class Latent {
+    code,    ///< code `index` of the model's training codes
+    values,  ///< `z` itself
+    file     ///< `latent_file`, or the folder of uniphy_infer that holds latent.h5
+  };
+
+  kernels::LawDescription description;  ///< complete for the analytic laws
+  std::filesystem::path model;          ///< learned; may be empty with Latent::file
+  Latent latent = Latent::code;
+  std::int64_t index = 0;
+  std::vector<double> z;
+  std::filesystem::path latent_file;
+
+  /// The law with weights and latent code. Throws Error naming the file, and the index or the
+  /// length that does not fit.
+  kernels::LawDescription load() const;
+};
+
+/// Declares and reads the keys of a law: `type` and, beside it, the parameters of that law.
+LawSource read_law(Section& law);
+
+/// The fitted law in `latent` (latent.h5, or the folder that holds it). Its model is `model`, or,
+/// where that is empty, the one that the latent file names, looked for as written, beside the
+/// latent file, and as model.h5 beside it.
+kernels::LawDescription load_fitted_law(const std::filesystem::path& latent,
+                                        const std::filesystem::path& model = {});
+
+}  // namespace uniphy

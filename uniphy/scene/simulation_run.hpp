@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstdint>
+
+#include "uniphy/config/config.hpp"
+#include "uniphy/report/experiment.hpp"
+#include "uniphy/scene/scene.hpp"
+
+namespace uniphy {
+
+/// What a simulation leaves in its output directory.
+struct SimulationOutput {
+  FrameFields fields;               ///< stored with every frame besides x
+  int gzip = 0;                     ///< 0 … 9
+  std::int64_t picture_frames = 6;  ///< panels of frames.png, 0: no picture
+};
+
+/// Declares and reads the section `output`.
+SimulationOutput read_simulation_output(Section& config);
+
+/// Runs the scene and writes trajectory.h5, trajectory.xdmf and frames.png into `out`; frames go to
+/// the disk as they come. Metrics: dt, stable_dt (s), steps, frames, simulated_s, particles and,
+/// for each body, particles.NAME and volume.NAME (m³), mass (kg), ns_per_particle_step.
+void simulate_into(const SceneDescription& scene, const SimulationOutput& output, RunDirectory& out,
+                   Metrics& metrics);
+
+}  // namespace uniphy
