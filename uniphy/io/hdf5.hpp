@@ -5,6 +5,7 @@
 // use readers and writers from one thread at a time.
 //
 // Names are paths from the root ("/samples/F"); groups on the way are made. Arrays are row-major.
+// Text is written as UTF-8 of fixed length (h5py shows it as bytes) and read with any length.
 
 #include <cstdint>
 #include <filesystem>

@@ -71,7 +71,7 @@ std::string Reader::attribute_text(const std::string& object, const std::string&
   const auto attribute =
       open_attribute(impl_->file, rooted(object), name, H5T_STRING, "text", 1, fail);
   if (H5Tis_variable_str(attribute.type) > 0) {
-    const Handle memory_type = text_type();
+    const Handle memory_type = text_type(H5T_VARIABLE);
     H5Tset_cset(memory_type, H5Tget_cset(attribute.type));
     char* pointer = nullptr;
     if (H5Aread(attribute.handle, memory_type, &pointer) < 0) {

@@ -52,8 +52,9 @@ inline Handle group_handle(hid_t id) { return {id, H5Gclose}; }
 void silence_hdf5();
 /// The innermost message of HDF5's error stack, or "unknown HDF5 error".
 std::string hdf5_reason();
-/// Variable-length UTF-8 text.
-Handle text_type();
+/// UTF-8 text of at most `size` bytes, padded with zeros (H5T_VARIABLE: of any length). Files are
+/// written with fixed lengths, for HDF5 reads damaged variable-length text without care.
+Handle text_type(std::size_t size);
 /// "float64", "int32", "text", "compound"
 std::string type_text(hid_t type);
 

@@ -240,7 +240,7 @@ std::vector<std::string> Reader::read_strings(const std::string& name, std::int6
   const auto size = static_cast<std::size_t>(shape[0]);
   if (H5Tis_variable_str(type) > 0) {
     // The file's own character set: HDF5 does not convert between ASCII and UTF-8.
-    const Handle memory_type = text_type();
+    const Handle memory_type = text_type(H5T_VARIABLE);
     H5Tset_cset(memory_type, H5Tget_cset(type));
     std::vector<char*> pointers(size, nullptr);
     if (H5Dread(set, memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, pointers.data()) < 0) {

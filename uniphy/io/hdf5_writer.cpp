@@ -52,9 +52,8 @@ struct Writer::Impl {
   }
 
   void set_text(const std::string& object, const std::string& name, const std::string& value) {
-    const Handle type = text_type();
-    const char* pointer = value.c_str();
-    set_attribute(object, name, type, dataspace(H5Screate(H5S_SCALAR)), type, &pointer);
+    const Handle type = text_type(value.size());
+    set_attribute(object, name, type, dataspace(H5Screate(H5S_SCALAR)), type, value.c_str());
   }
 
   void set_attribute(const std::string& object, const std::string& name, hid_t file_type,
@@ -70,11 +69,26 @@ struct Writer::Impl {
     }
   }
 
+  /// Makes the group and those above it, where they are not there yet.
+  void make_group(const std::string& name) {
+    const Handle properties = property_list(H5Pcreate(H5P_GROUP_CREATE));
+    H5Pset_obj_track_times(properties, false);
+    for (std::size_t slash = 0; slash != std::string::npos;) {
+      slash = name.find('/', slash + 1);
+      const std::string part = name.substr(0, slash);
+      if (H5Lexists(file, part.c_str(), H5P_DEFAULT) > 0) continue;
+      const Handle group =
+          group_handle(H5Gcreate2(file, part.c_str(), H5P_DEFAULT, properties, H5P_DEFAULT));
+      if (!group.valid()) fail_hdf5(part, "made");
+    }
+  }
+
   Handle create(const std::string& name, hid_t type, const Handle& space,
                 const std::vector<hsize_t>& chunk, const Info& info) {
-    const Handle links = property_list(H5Pcreate(H5P_LINK_CREATE));
-    H5Pset_create_intermediate_group(links, 1);
+    const std::size_t slash = name.rfind('/');
+    if (slash > 0) make_group(name.substr(0, slash));
     const Handle storage = property_list(H5Pcreate(H5P_DATASET_CREATE));
+    H5Pset_obj_track_times(storage, false);
     if (!chunk.empty()) {
       H5Pset_chunk(storage, static_cast<int>(chunk.size()), chunk.data());
       if (info.gzip > 0) {
@@ -82,7 +96,8 @@ struct Writer::Impl {
         H5Pset_deflate(storage, static_cast<unsigned>(std::min(info.gzip, 9)));
       }
     }
-    Handle set = dataset(H5Dcreate2(file, name.c_str(), type, space, links, storage, H5P_DEFAULT));
+    Handle set =
+        dataset(H5Dcreate2(file, name.c_str(), type, space, H5P_DEFAULT, storage, H5P_DEFAULT));
     if (!set.valid()) fail_hdf5(name, "made");
     set_text(name, "units", info.units);
     set_text(name, "description", info.description);
@@ -98,9 +113,15 @@ Writer::Writer(const std::filesystem::path& file) : impl_(std::make_unique<Impl>
   if (std::filesystem::is_directory(file, ignored)) {
     throw Error(fmt::format("{}: expected a file, found a directory", file.string()));
   }
+  // The format of HDF5 1.8 has checksums on its metadata, so that damage is found, and takes text
+  // attributes longer than 64 KiB.
+  const Handle access = property_list(H5Pcreate(H5P_FILE_ACCESS));
+  H5Pset_libver_bounds(access, H5F_LIBVER_V18, H5F_LIBVER_V18);
+  // No times anywhere: the same data make the same file, byte for byte.
+  const Handle creation = property_list(H5Pcreate(H5P_FILE_CREATE));
+  H5Pset_obj_track_times(creation, false);
   errno = 0;
-  impl_->file =
-      file_handle(H5Fcreate(impl_->temporary.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT));
+  impl_->file = file_handle(H5Fcreate(impl_->temporary.c_str(), H5F_ACC_TRUNC, creation, access));
   if (!impl_->file.valid()) {
     const std::string reason = errno ? std::strerror(errno) : hdf5_reason();
     throw Error(fmt::format("{}: cannot be written: {}", file.string(), reason));
@@ -150,11 +171,16 @@ void Writer::write_strings(const std::string& name, const std::vector<std::strin
   const std::string full = rooted(name);
   const hsize_t size = data.size();
   const Handle space = dataspace(H5Screate_simple(1, &size, nullptr));
-  const Handle type = text_type();
+  std::size_t width = 1;
+  for (const std::string& text : data) width = std::max(width, text.size());
+  const Handle type = text_type(width);
   const Handle set = impl_->create(full, type, space, {}, info);
-  std::vector<const char*> pointers;
-  for (const std::string& text : data) pointers.push_back(text.c_str());
-  if (!data.empty() && H5Dwrite(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, pointers.data()) < 0) {
+  std::string padded;
+  for (const std::string& text : data) {
+    padded += text;
+    padded.append(width - text.size(), '\0');
+  }
+  if (!data.empty() && H5Dwrite(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, padded.data()) < 0) {
     impl_->fail_hdf5(full, "written");
   }
 }
@@ -237,13 +263,7 @@ void Writer::attribute(const std::string& object, const std::string& name,
                        value.data());
 }
 
-void Writer::group(const std::string& name) {
-  const Handle links = property_list(H5Pcreate(H5P_LINK_CREATE));
-  H5Pset_create_intermediate_group(links, 1);
-  const Handle group =
-      group_handle(H5Gcreate2(impl_->file, rooted(name).c_str(), links, H5P_DEFAULT, H5P_DEFAULT));
-  if (!group.valid()) impl_->fail_hdf5(rooted(name), "made");
-}
+void Writer::group(const std::string& name) { impl_->make_group(rooted(name)); }
 
 void Writer::flush() {
   if (H5Fflush(impl_->file, H5F_SCOPE_GLOBAL) < 0) impl_->fail_hdf5("/", "flushed");
