@@ -1,0 +1,143 @@
+#include "uniphy/io/observation.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+
+#include "tests/uniphy/support/scratch.hpp"
+#include "uniphy/io/atomic_file.hpp"
+#include "uniphy/io/hdf5.hpp"
+
+namespace uniphy {
+namespace {
+
+Observation example() {
+  Observation o;
+  o.frames = 3;
+  o.particles = 2;
+  for (int i = 0; i < 18; ++i) o.x.push_back(0.01 * i);
+  o.time = {0, 0.1, 0.2};
+  o.volume = {1e-6, 2e-6};
+  o.grid = 32;
+  o.dt = 2.5e-4;
+  o.gravity = {0, -1.6, 0.1};
+  o.walls = "noslip";
+  o.bound = 4;
+  o.density = 1500;
+  return o;
+}
+
+TEST(Observation, ReadsBackToTheSameBits) {
+  const testing::Scratch scratch;
+  const Observation written = example();
+  write_observation(scratch.file("o.h5"), written);
+  const Observation read = read_observation(scratch.file("o.h5"));
+  EXPECT_EQ(read.x, written.x);
+  EXPECT_EQ(read.time, written.time);
+  EXPECT_EQ(read.volume, written.volume);
+  EXPECT_EQ(read.frames, 3);
+  EXPECT_EQ(read.particles, 2);
+  EXPECT_EQ(read.grid, 32);
+  EXPECT_EQ(read.dt, 2.5e-4);
+  EXPECT_EQ(read.gravity, written.gravity);
+  EXPECT_EQ(read.walls, "noslip");
+  EXPECT_EQ(read.bound, 4);
+  EXPECT_EQ(read.density, 1500);
+  EXPECT_EQ(read.positions(1)[0], 0.06);
+}
+
+TEST(Observation, HoldsNothingAboutTheMaterial) {
+  const testing::Scratch scratch;
+  write_observation(scratch.file("o.h5"), example());
+  const hdf5::Reader reader(scratch.file("o.h5"));
+  EXPECT_THAT(reader.members("/"), ::testing::ElementsAre("scene", "time", "volume", "x"));
+  EXPECT_TRUE(reader.members("scene").empty());
+}
+
+// What a writer refuses and what a reader refuses is one list.
+TEST(Observation, ImpossibleValuesAreRefused) {
+  struct Case {
+    const char* message;
+    std::function<void(Observation&)> spoil;
+  };
+  const Case cases[] = {
+      {"o.h5: attribute grid of /scene: expected 8 to 4096 nodes, found 4",
+       [](Observation& o) { o.grid = 4; }},
+      {"o.h5: attribute dt of /scene: expected a time step in (0, 1) s, found 0",
+       [](Observation& o) { o.dt = 0; }},
+      {"o.h5: attribute walls of /scene: expected \"freeslip\" or \"noslip\", found \"sticky\"",
+       [](Observation& o) { o.walls = "sticky"; }},
+      {"o.h5: attribute bound of /scene: expected 1 to 15 nodes, found 16",
+       [](Observation& o) { o.bound = 16; }},
+      {"o.h5: attribute density of /scene: expected a density > 0 kg/m^3, found -1",
+       [](Observation& o) { o.density = -1; }},
+      {"o.h5: attribute gravity of /scene: expected finite numbers, found nan",
+       [](Observation& o) { o.gravity[2] = std::nan(""); }},
+      {"o.h5: /time: expected increasing times, found 0.1 s after 0.1 s",
+       [](Observation& o) { o.time[2] = 0.1; }},
+      {"o.h5: /volume: expected volumes > 0, found 0", [](Observation& o) { o.volume[0] = 0; }},
+      {"o.h5: /x: expected 18 numbers for the shape [3, 2, 3], found 17",
+       [](Observation& o) { o.x.pop_back(); }},
+      {"o.h5: /x: expected at least two frames of one particle, found 1 of 2",
+       [](Observation& o) { o.frames = 1; }},
+  };
+  for (const Case& c : cases) {
+    const testing::Scratch scratch;
+    Observation observation = example();
+    c.spoil(observation);
+    EXPECT_EQ(testing::without_directory(
+                  testing::error_of([&] { write_observation(scratch.file("o.h5"), observation); }),
+                  scratch.path()),
+              c.message);
+    EXPECT_TRUE(std::filesystem::is_empty(scratch.path()));
+  }
+}
+
+TEST(Observation, MalformedFilesAreRefused) {
+  struct Case {
+    const char* message;
+    std::function<void(hdf5::Writer&)> spoil;
+  };
+  const hdf5::Info info{"m", ""};
+  const Case cases[] = {
+      {"o.h5: attribute grid of /scene: expected 8 to 4096 nodes, found -1",
+       [](hdf5::Writer& w) { w.attribute("scene", "grid", std::int64_t{1} << 40); }},
+      {"o.h5: attribute dt of /scene: expected floating-point numbers, found int64",
+       [](hdf5::Writer& w) { w.attribute("scene", "dt", 1); }},
+      {"o.h5: attribute gravity of /scene: expected 3 values, found 2 values",
+       [](hdf5::Writer& w) {
+         w.attribute("scene", "gravity", std::vector<double>{0, 1});
+       }},
+      {"o.h5: attribute walls of /scene: expected text, found float64",
+       [](hdf5::Writer& w) { w.attribute("scene", "walls", 3.0); }},
+      {"o.h5: attribute density of /scene: expected a finite number, found inf",
+       [](hdf5::Writer& w) { w.attribute("scene", "density", INFINITY); }},
+  };
+  for (const Case& c : cases) {
+    const testing::Scratch scratch;
+    hdf5::Writer w(scratch.file("o.h5"));
+    w.attribute("/", "format", "uniphy-observation");
+    w.attribute("/", "version", 1);
+    w.write("x", std::vector<double>(6, 0.5), {2, 1, 3}, info);
+    w.write("time", std::vector<double>{0, 1}, {2}, info);
+    w.write("volume", std::vector<double>{1}, {1}, info);
+    w.group("scene");
+    w.attribute("scene", "grid", 20);
+    w.attribute("scene", "dt", 1e-3);
+    w.attribute("scene", "gravity", std::vector<double>{0, -9.8, 0});
+    w.attribute("scene", "walls", "freeslip");
+    w.attribute("scene", "bound", 3);
+    w.attribute("scene", "density", 1000.0);
+    c.spoil(w);
+    w.commit();
+    EXPECT_EQ(
+        testing::without_directory(
+            testing::error_of([&] { read_observation(scratch.file("o.h5")); }), scratch.path()),
+        c.message);
+  }
+}
+
+}  // namespace
+}  // namespace uniphy
