@@ -80,9 +80,13 @@ std::vector<int> parameter_places(LawId id) {
   return places;
 }
 
+void check_parameters(const LawDescription& description) {
+  for (const int place : parameter_places(description.id)) check_parameter(description, place);
+}
+
 template <class T>
 std::shared_ptr<const LawKernel<T>> make_analytic_law(const LawDescription& description, Isa isa) {
-  for (const int place : parameter_places(description.id)) check_parameter(description, place);
+  check_parameters(description);
   return std::make_shared<AnalyticLaw<T>>(description, isa);
 }
 
