@@ -47,10 +47,10 @@ DatasetMetrics::DatasetMetrics(const GenerateOptions& options) : dt_(options.dt.
 
 void DatasetMetrics::add(const TrajectorySetup& setup, const TrajectoryPart& part) {
   const auto at = std::find_if(materials_.begin(), materials_.end(),
-                               [&](const Material& m) { return m.id == setup.law.id; });
+                               [&](const Material& m) { return m.id == setup.law().id; });
   Material& material = *at;
   const auto& names = branch_names(material.id);
-  const auto features = sample_features(setup.law, part.samples);
+  const auto features = sample_features(setup.law(), part.samples);
   bool yields = false;
   for (std::size_t s = 0; s < features.size(); ++s) {
     const auto branch = static_cast<std::size_t>(features[s].branch);
@@ -63,7 +63,7 @@ void DatasetMetrics::add(const TrajectorySetup& setup, const TrajectoryPart& par
   ++material.trajectories;
   material.yielding += yields ? 1 : 0;
   material.failed += static_cast<std::int64_t>(part.failures.size());
-  if (setup.grid.dt < dt_) ++dt_lowered_;
+  if (setup.record.dt < dt_) ++dt_lowered_;
 }
 
 void DatasetMetrics::write(Metrics& metrics) const {

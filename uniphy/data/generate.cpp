@@ -27,7 +27,7 @@ std::uint64_t hash_text(const std::string& text) {
 
 std::string describe(const TrajectorySetup& setup) {
   std::string text = setup.record.material;
-  for (const std::string& name : kernels::parameter_names(setup.law.id)) {
+  for (const std::string& name : kernels::parameter_names(setup.law().id)) {
     for (std::size_t k = 0; k < kParameterNames.size(); ++k) {
       if (name != kParameterNames[k]) continue;
       text += fmt::format(", {} {:.4g}", name, setup.record.parameters[k]);

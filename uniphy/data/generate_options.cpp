@@ -1,5 +1,8 @@
 #include "uniphy/data/generate_options.hpp"
 
+#include <fmt/format.h>
+
+#include <cmath>
 #include <map>
 
 #include "uniphy/geometry/shape_catalogue.hpp"
@@ -58,10 +61,10 @@ void read_simulation(Section& config, GenerateOptions& o) {
   o.grid.n = static_cast<int>(s.integer("grid", 20, between(10, 256), "", "nodes a side"));
   o.grid.bound =
       static_cast<int>(s.integer("bound", 3, between(2, 32), "", "thickness of the walls, nodes"));
-  if (2 * o.grid.bound >= o.grid.n / 2 && !s.describing()) {
-    s.fail("bound", "expected walls that leave half of the grid free, found " +
-                        std::to_string(o.grid.bound) + " of " + std::to_string(o.grid.n) +
-                        " nodes on each side");
+  if (4 * o.grid.bound > o.grid.n + 2 && !s.describing()) {
+    s.fail("bound", fmt::format("expected walls that leave half of the grid free, found {} of {} "
+                                "nodes on each side",
+                                o.grid.bound, o.grid.n));
   }
   const std::string wall =
       s.choice("wall", "freeslip", {"freeslip", "noslip"}, "what the walls do");
@@ -91,6 +94,13 @@ void read_bodies(Section& config, GenerateOptions& o) {
                                                         "knurling", "pawn", "rounded_cone", "toy"},
                                shape_names(), "shapes of heldout_all", at_least(1));
   o.size = s.interval("size", o.size, between(0.01, 0.6), "m", "largest side before the rotation");
+  const double room = 1 - 2 * o.grid.bound * o.grid.dx(), diagonal = std::sqrt(3.0) * o.size[1];
+  if (diagonal > 0.95 * room && !s.describing()) {
+    s.fail("size",
+           fmt::format("expected bodies that fit between the walls when turned (up to {:.3g} "
+                       "m), found {:.3g} m",
+                       0.95 * room / std::sqrt(3.0), o.size[1]));
+  }
 
   Section m = config.section("motion", "where bodies start and how they move");
   o.motions = m.choices("kinds", o.motions, o.motions,
@@ -113,6 +123,10 @@ void read_samples(Section& config, GenerateOptions& o) {
   Section s = config.section("samples", "what is kept of a trajectory");
   o.samples = s.integer("per_trajectory", 1000, between(10, 1000000), "", "number of samples");
   o.every = s.integer("every", 10, between(1, 100000), "", "steps between two looks");
+  if (o.every > o.steps && !s.describing()) {
+    s.fail("every", fmt::format("expected at most the {} steps of a trajectory, found {}", o.steps,
+                                o.every));
+  }
   o.uniform_share = s.real("uniform_share", 0.25, between(0, 1), "",
                            "part of the simulated samples taken as they come; the others are "
                            "spread over branches of the law, strains and rates");
@@ -120,10 +134,12 @@ void read_samples(Section& config, GenerateOptions& o) {
                         "states drawn at random and put to the analytic law, for branches "
                         "and strains that the trajectory does not reach");
   o.drawn_share = d.real("share", 0.25, between(0, 1), "", "part of the samples");
+  o.drawn_step = d.real("step", 0.01, between(1e-5, 1), "",
+                        "largest step of a trial strain past the yield surface");
   o.drawn_strain = d.real("strain", 0.5, between(0.001, 1), "", "largest Hencky strain");
-  o.drawn_beyond = d.real("beyond", 3, at_least(1), "",
-                          "strains reach this times what the trajectory saw (yield surfaces are "
-                          "visited up to `strain` even so)");
+  o.drawn_beyond = d.real("beyond", 1.5, at_least(1), "",
+                          "strains and stresses reach this times what the trajectory saw (yield "
+                          "surfaces are visited up to `strain` even so)");
   o.drawn_affine = d.interval("affine", o.drawn_affine, positive(), "1/s",
                               "norm of the affine velocity, log-uniform");
 }

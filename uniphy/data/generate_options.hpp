@@ -51,7 +51,8 @@ struct GenerateOptions {
   double uniform_share = 0.25;
   double drawn_share = 0.25;
   double drawn_strain = 0.5;  ///< largest
-  double drawn_beyond = 3;
+  double drawn_step = 0.01;
+  double drawn_beyond = 1.5;
   std::array<double, 2> drawn_affine{0.1, 100};  ///< 1/s
 
   std::int64_t total() const { return trajectories * static_cast<std::int64_t>(materials.size()); }

@@ -86,7 +86,7 @@ std::vector<std::int64_t> level_up(const std::vector<std::int64_t>& counts,
 
 std::vector<std::int64_t> select_samples(const std::vector<SampleFeatures>& features, int branches,
                                          std::int64_t count, double uniform_share,
-                                         UniformRandom& random) {
+                                         double first_share, UniformRandom& random) {
   Indices rest(features.size()), chosen;
   std::iota(rest.begin(), rest.end(), 0);
   count = std::min<std::int64_t>(count, static_cast<std::int64_t>(rest.size()));
@@ -100,7 +100,16 @@ std::vector<std::int64_t> select_samples(const std::vector<SampleFeatures>& feat
   const auto feature = [&](std::int64_t i) -> const SampleFeatures& {
     return features[static_cast<std::size_t>(i)];
   };
-  const auto of_branch = fill_evenly(sizes(by_branch), count - uniform);
+  auto of_branch = fill_evenly(sizes(by_branch), count - uniform);
+  const std::int64_t first = std::llround(first_share * static_cast<double>(count - uniform));
+  if (of_branch[0] > first) {
+    // What the others cannot take stays with the first.
+    auto others = sizes(by_branch);
+    others[0] = 0;
+    of_branch = fill_evenly(others, count - uniform - first);
+    of_branch[0] =
+        count - uniform - std::accumulate(of_branch.begin(), of_branch.end(), std::int64_t{0});
+  }
   for (std::size_t b = 0; b < by_branch.size(); ++b) {
     auto by_strain =
         cut(by_branch[b], kStrainParts, [&](std::int64_t i) { return feature(i).strain; });

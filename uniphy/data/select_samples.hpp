@@ -23,9 +23,10 @@ std::vector<std::int64_t> level_up(const std::vector<std::int64_t>& counts,
 /// `uniform_share` is taken as the simulation gives them; the rest is spread evenly over the
 /// branches, within a branch over eight parts of its range of strain and within those over four of
 /// the second feature, both cut evenly on a logarithmic scale between the quantiles 0.005 and
-/// 0.995. A branch or part that has too little leaves its share to the others.
+/// 0.995. A branch or part that has too little leaves its share to the others. At most a part
+/// `first_share` of the rest is of branch 0.
 std::vector<std::int64_t> select_samples(const std::vector<SampleFeatures>& features, int branches,
                                          std::int64_t count, double uniform_share,
-                                         UniformRandom& random);
+                                         double first_share, UniformRandom& random);
 
 }  // namespace uniphy

@@ -19,6 +19,10 @@ constexpr double kLargestEntry = 1e3;  ///< of F
 constexpr double kEqualPart = 0.25;    ///< of the drawn states goes to all branches alike
 /// However small the strains of a trajectory, drawn ones reach this.
 constexpr double kLeastDrawnStrain = 0.01;
+/// What a trajectory "saw" of strain and stress: a few wild particles do not count.
+constexpr double kHighQuantile = 0.995;
+/// Of the samples that are spread over branches, at most this part at rest.
+constexpr double kRestShare = 0.1;
 
 void append_rows(const LawSamples& from, const std::vector<std::int64_t>& rows, LawSamples& to) {
   const auto copy = [&](const std::vector<double>& source, std::vector<double>& target) {
@@ -67,13 +71,55 @@ std::vector<std::int64_t> count_branches(const std::vector<SampleFeatures>& feat
   return counts;
 }
 
+DrawnStateRanges drawn_ranges(const GenerateOptions& options, const LawSamples& candidates,
+                              const std::vector<SampleFeatures>& features) {
+  std::vector<double> strains, stresses;
+  for (const SampleFeatures& f : features) strains.push_back(f.strain);
+  for (std::size_t k = 0; k < candidates.tau.size(); k += 9) {
+    double square = 0;
+    for (std::size_t i = k; i < k + 9; ++i) square += candidates.tau[i] * candidates.tau[i];
+    stresses.push_back(std::sqrt(square));
+  }
+  const double strain = quantile(std::move(strains), kHighQuantile);
+  DrawnStateRanges ranges;
+  ranges.strain =
+      std::min(options.drawn_strain, std::max(kLeastDrawnStrain, options.drawn_beyond * strain));
+  ranges.yield_strain = std::max(options.drawn_strain, strain);
+  ranges.stress = options.drawn_beyond * quantile(std::move(stresses), kHighQuantile);
+  ranges.step = options.drawn_step;
+  ranges.affine_low = options.drawn_affine[0];
+  ranges.affine_high = options.drawn_affine[1];
+  return ranges;
+}
+
+/// Drawn states of each branch, given the simulated samples of each.
+std::vector<std::int64_t> drawn_shares(const TrajectorySetup& setup, const DrawnStateRanges& ranges,
+                                       std::vector<std::int64_t> simulated, std::int64_t drawn,
+                                       bool rests) {
+  std::vector<bool> open(simulated.size());
+  std::vector<std::int64_t> room(simulated.size(), 0);
+  for (std::size_t b = 0; b < open.size(); ++b) {
+    open[b] = branch_reachable(setup.law(), setup.record.dt, static_cast<int>(b), ranges);
+    if (open[b]) room[b] = drawn;
+  }
+  std::vector<std::int64_t> shares =
+      fill_evenly(room, std::llround(kEqualPart * static_cast<double>(drawn)));
+  std::int64_t left = drawn;
+  for (std::size_t b = 0; b < shares.size(); ++b) {
+    simulated[b] += shares[b];
+    left -= shares[b];
+  }
+  if (rests) open[0] = false;  // states at rest say little
+  const auto more = level_up(simulated, open, left);
+  for (std::size_t b = 0; b < shares.size(); ++b) shares[b] += more[b];
+  return shares;
+}
+
 }  // namespace
 
 LawSamples simulate_candidates(const TrajectorySetup& setup, std::int64_t every) {
-  const auto law = kernels::make_law<double>(setup.law);
-  const auto particles = setup.initial.size();
-  const kernels::Rollout<double> rollout(setup.grid, {{0, particles, law}}, setup.mass,
-                                         setup.volume);
+  const PlacedScene placed = place_scene(setup.scene);
+  Scene<double> scene = build_scene<double>(setup.scene, placed);
   LawSamples candidates;
   kernels::RunOptions<double> run;
   run.sample_step = [every](std::ptrdiff_t step) { return step % every == every - 1; };
@@ -87,8 +133,7 @@ LawSamples simulate_candidates(const TrajectorySetup& setup, std::int64_t every)
     add(sample.C, candidates.C);
     add(sample.tau, candidates.tau);
   };
-  kernels::ParticleState<double> state = setup.initial;
-  rollout.run(state, setup.steps, run);
+  scene.rollout.run(scene.initial, placed.steps, run);
   return candidates;
 }
 
@@ -96,44 +141,26 @@ LawSamples trajectory_samples(const GenerateOptions& options, const TrajectorySe
                               std::uint64_t seed) {
   UniformRandom random(seed);
   const LawSamples candidates = simulate_candidates(setup, options.every);
-  const std::vector<SampleFeatures> features = sample_features(setup.law, candidates);
-  const std::size_t branches = branch_names(setup.law.id).size();
+  const std::vector<SampleFeatures> features = sample_features(setup.law(), candidates);
+  const std::vector<std::string>& branches = branch_names(setup.law().id);
+  const bool rests = branches.front() == "rest";
 
   const std::int64_t drawn =
       std::llround(options.drawn_share * static_cast<double>(options.samples));
-  const auto rows = select_samples(features, static_cast<int>(branches), options.samples - drawn,
-                                   options.uniform_share, random);
+  const auto rows =
+      select_samples(features, static_cast<int>(branches.size()), options.samples - drawn,
+                     options.uniform_share, rests ? kRestShare : 1, random);
   LawSamples samples;
   append_rows(candidates, rows, samples);
   samples.source.assign(rows.size(), kSimulatedSample);
 
-  DrawnStateRanges ranges;
-  std::vector<double> strains;
-  for (const SampleFeatures& f : features) strains.push_back(f.strain);
-  ranges.strain = std::min(
-      options.drawn_strain,
-      std::max(kLeastDrawnStrain, options.drawn_beyond * quantile(std::move(strains), 0.99)));
-  ranges.yield_strain = options.drawn_strain;
-  ranges.affine_low = options.drawn_affine[0];
-  ranges.affine_high = options.drawn_affine[1];
-  std::vector<bool> open(branches);
-  std::vector<std::int64_t> counts = count_branches(features, rows, branches);
-  std::vector<std::int64_t> room(branches, 0);
-  for (std::size_t b = 0; b < branches; ++b) {
-    open[b] = branch_reachable(setup.law, static_cast<int>(b), ranges);
-    if (open[b]) room[b] = drawn;
-  }
-  const auto equal = fill_evenly(room, std::llround(kEqualPart * static_cast<double>(drawn)));
-  std::int64_t left = drawn;
-  for (std::size_t b = 0; b < branches; ++b) {
-    counts[b] += equal[b];
-    left -= equal[b];
-  }
-  const auto levelled = level_up(counts, open, left);
-  for (std::size_t b = 0; b < branches; ++b) {
-    append_all(draw_states(setup.law, setup.grid.dt, static_cast<int>(b), equal[b] + levelled[b],
-                           ranges, random),
-               samples);
+  const DrawnStateRanges ranges = drawn_ranges(options, candidates, features);
+  const auto shares =
+      drawn_shares(setup, ranges, count_branches(features, rows, branches.size()), drawn, rests);
+  for (std::size_t b = 0; b < branches.size(); ++b) {
+    append_all(
+        draw_states(setup.law(), setup.record.dt, static_cast<int>(b), shares[b], ranges, random),
+        samples);
   }
   samples.source.resize(static_cast<std::size_t>(samples.size()), kDrawnSample);
   return samples;

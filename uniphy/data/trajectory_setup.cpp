@@ -5,7 +5,6 @@
 
 #include "uniphy/data/random_rotation.hpp"
 #include "uniphy/data/random_streams.hpp"
-#include "uniphy/geometry/fill.hpp"
 #include "uniphy/geometry/random.hpp"
 #include "uniphy/geometry/shape_catalogue.hpp"
 
@@ -45,26 +44,21 @@ LawDescription draw_law(const GenerateOptions& o, std::int64_t trajectory, std::
   return material_at(o.material_of(trajectory), unit);
 }
 
-struct Body {
-  std::string shape;
-  std::vector<Vector3d> x;  ///< about the origin, m
-  double volume = 0;        ///< m³
-  double spacing = 0;       ///< m
-};
-
-Body draw_body(const GenerateOptions& o, std::int64_t trajectory, std::int64_t attempt) {
+/// A body of its own shape, size and turn about the origin, at rest.
+BodyDescription draw_body(const GenerateOptions& o, std::int64_t trajectory, std::int64_t attempt,
+                          std::string& shape) {
   UniformRandom random = stream(o, Stream::body, trajectory, attempt);
   const auto& shapes = o.split == Split::heldout_all ? o.heldout_shapes : o.shapes;
-  Body body;
-  body.shape = shapes[random.below(shapes.size())];
-  const SolidPtr solid = make_shape(body.shape, 1 + random.below(1u << 20));
-  const Bounds bounds = solid->bounds();
-  const double scale = random.log_between(o.size[0], o.size[1]) / bounds.largest_side();
-  const Eigen::Matrix3d rotation = random_rotation(random);
-  body.x = fill_lattice_nearest(*solid, o.particles);
-  for (Vector3d& x : body.x) x = scale * (rotation * (x - bounds.centre()));
-  body.volume = scale * scale * scale * solid->volume();
-  body.spacing = std::cbrt(body.volume / static_cast<double>(body.x.size()));
+  shape = shapes[random.below(shapes.size())];
+  BodyDescription body;
+  body.name = shape;
+  body.solid = make_shape(shape, 1 + random.below(1u << 20));
+  body.filling.kind = Filling::Kind::lattice;
+  body.filling.count = o.particles;
+  body.placement.centre = Vector3d::Zero();
+  body.placement.size = random.log_between(o.size[0], o.size[1]);
+  body.placement.rotation = random_rotation(random);
+  body.density = o.density;
   return body;
 }
 
@@ -114,72 +108,65 @@ Motion draw_motion(const GenerateOptions& o, const LawDescription& law, double d
   return m;
 }
 
-/// The shift that puts the body at m.gap from the wall that it moves to (less by the ratio of the
+/// The centre that puts the body at m.gap from the wall that it moves to (less by the ratio of the
 /// velocities for the walls that it moves to more slowly), anywhere along the axes that it does not
-/// move along. `low`, `high` (m) hold what the walls leave free.
-Vector3d place(const Body& body, const Motion& m, double low, double high) {
-  Vector3d first = body.x.front(), last = body.x.front(), shift;
-  for (const Vector3d& x : body.x) {
+/// move along. `wall` (m) is how thick the walls are.
+Vector3d place(const BodyDescription& body, const Motion& m, double wall) {
+  const BodyParticles particles = place_body(body);
+  Vector3d first = particles.x.front(), last = first, centre;
+  for (const Vector3d& x : particles.x) {
     first = first.cwiseMin(x);
     last = last.cwiseMax(x);
   }
+  const double margin = 0.5 * std::cbrt(particles.volume.front());
   const double lead = m.direction.cwiseAbs().maxCoeff();
   for (int axis = 0; axis < 3; ++axis) {
-    const double least = low + 0.5 * body.spacing - first[axis];
-    const double most = std::max(least, high - 0.5 * body.spacing - last[axis]);
+    const double least = wall + margin - first[axis];
+    const double most = std::max(least, 1 - wall - margin - last[axis]);
     const double share = m.direction[axis] / lead;
     double wanted = least + (most - least) * m.place[axis];
     if (share < 0) wanted = least - share * m.gap;
     if (share > 0) wanted = most - share * m.gap;
-    shift[axis] = std::clamp(wanted, least, most);
+    centre[axis] = std::clamp(wanted, least, most);
   }
-  return shift;
+  return centre;
+}
+
+/// The fixed step where it is stable, else (and for `auto`) what the stiffness allows.
+double time_step(const GenerateOptions& o, const LawDescription& law) {
+  const Stiffness stiffness = estimate_stiffness(law);
+  const auto allowed = [&](double safety) {
+    return stable_time_step(stiffness, o.density, o.grid.dx(), o.speed[1], safety);
+  };
+  if (o.dt && *o.dt <= allowed(kFixedStepSafety)) return *o.dt;
+  return round_time_step(allowed(o.dt ? kFixedStepSafety : kTimeStepSafety));
 }
 
 }  // namespace
 
-double stable_time_step(const LawDescription& law, double density, double dx) {
-  const double wave = 0.5 * dx / wave_speed(law, density);
-  if (law.id != kernels::LawId::newtonian) return wave;
-  return std::min(wave, density * dx * dx / (8 * law.mu));
-}
-
 TrajectorySetup draw_setup(const GenerateOptions& o, std::int64_t trajectory,
                            std::int64_t attempt) {
   TrajectorySetup setup;
-  setup.law = draw_law(o, trajectory, attempt);
-  setup.grid = o.grid;
-  const double stable = stable_time_step(setup.law, o.density, setup.grid.dx());
-  setup.grid.dt = std::min(o.dt.value_or(stable), stable);
-  setup.steps = o.steps;
+  BodyDescription body = draw_body(o, trajectory, attempt, setup.record.shape);
+  body.law = draw_law(o, trajectory, attempt);
+  setup.scene.grid = o.grid;
+  setup.scene.steps = o.steps;
+  const double dt = time_step(o, body.law);
+  setup.scene.dt = dt;
 
-  const Body body = draw_body(o, trajectory, attempt);
-  const double duration = static_cast<double>(o.steps) * setup.grid.dt;
-  const Motion motion = draw_motion(o, setup.law, duration, trajectory, attempt);
-  const double wall = o.grid.bound * o.grid.dx();
-  const Vector3d shift = place(body, motion, wall, 1 - wall);
-  std::vector<double> x, v;
-  Vector3d low = body.x.front(), high = low;
-  for (const Vector3d& p : body.x) {
-    const Vector3d at = p + shift;
-    const Vector3d velocity = motion.speed * motion.direction + motion.angular.cross(p);
-    x.insert(x.end(), at.data(), at.data() + 3);
-    v.insert(v.end(), velocity.data(), velocity.data() + 3);
-    low = low.cwiseMin(p);
-    high = high.cwiseMax(p);
-  }
-  setup.size = (high - low).maxCoeff() + body.spacing;
+  const Motion motion =
+      draw_motion(o, body.law, static_cast<double>(o.steps) * dt, trajectory, attempt);
   setup.motion = motion.kind;
-  setup.initial = kernels::ParticleState<double>::undeformed(std::move(x), std::move(v));
-  setup.volume.assign(body.x.size(), body.volume / static_cast<double>(body.x.size()));
-  setup.mass.assign(body.x.size(), o.density * setup.volume.front());
+  body.velocity = motion.speed * motion.direction;
+  body.angular_velocity = motion.angular;
+  body.placement.centre = place(body, motion, o.grid.bound * o.grid.dx());
 
-  setup.record.material = kernels::law_name(setup.law.id);
-  setup.record.parameters = parameters_of(setup.law);
-  setup.record.dt = setup.grid.dt;
+  setup.record.material = kernels::law_name(body.law.id);
+  setup.record.parameters = parameters_of(body.law);
+  setup.record.dt = dt;
   setup.record.density = o.density;
   setup.record.seed = static_cast<std::int64_t>(o.seed);
-  setup.record.shape = body.shape;
+  setup.scene.bodies.push_back(std::move(body));
   return setup;
 }
 

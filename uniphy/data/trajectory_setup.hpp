@@ -2,24 +2,21 @@
 
 #include <cstdint>
 #include <string>
-#include <vector>
 
-#include "ops/kernels/rollout.hpp"
 #include "uniphy/data/generate_options.hpp"
 #include "uniphy/io/dataset.hpp"
+#include "uniphy/scene/scene.hpp"
 
 namespace uniphy {
 
-/// Everything that a trajectory of a data set starts from; another law may be put in its place.
+/// Everything that a trajectory of a data set starts from. Another law may be put in the place of
+/// scene.bodies[0].law to see the same motion with it.
 struct TrajectorySetup {
   TrajectoryRecord record;
-  kernels::LawDescription law;
-  std::string motion;  ///< one of GenerateOptions::motions
-  double size = 0;     ///< largest side of the body at the start, m
-  kernels::GridSettings grid;
-  std::int64_t steps = 0;
-  kernels::ParticleState<double> initial;
-  std::vector<double> mass, volume;  ///< [P] kg, m³
+  std::string motion;      ///< one of GenerateOptions::motions
+  SceneDescription scene;  ///< one body; dt and steps are set
+
+  const kernels::LawDescription& law() const { return scene.bodies.front().law; }
 };
 
 /// Draws trajectory `trajectory` (0 … options.total() − 1). `attempt` counts the replacements of
@@ -29,8 +26,7 @@ struct TrajectorySetup {
 TrajectorySetup draw_setup(const GenerateOptions& options, std::int64_t trajectory,
                            std::int64_t attempt);
 
-/// The largest step (s) that is stable with room to spare: half a cell per pressure wave, and the
-/// explicit limit of viscosity, ρ Δx²/(8μ) (newtonian).
-double stable_time_step(const kernels::LawDescription& law, double density, double dx);
+/// Share of stable_time_step() up to which a fixed step is left as it is.
+inline constexpr double kFixedStepSafety = 0.6;
 
 }  // namespace uniphy
