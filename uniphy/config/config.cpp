@@ -82,6 +82,7 @@ std::string nearest_key(const std::string& key, const std::vector<std::string>& 
   if (key.size() > 64) return best;
   for (const std::string& candidate : known) {
     const int distance = edit_distance(key, candidate);
+    if (distance >= static_cast<int>(key.size())) continue;  // nothing in common
     if (distance < best_distance || (distance == best_distance && best.empty())) {
       best = candidate;
       best_distance = distance;
