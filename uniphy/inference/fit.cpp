@@ -145,7 +145,10 @@ class Fit {
     }
     for (const int i : choose_starts(unknowns_, early, full, options_.stages[0].candidates)) {
       const std::vector<double> u = unknowns_.start(i);
-      state_.candidates.push_back({i, u, motion_, loss(early[i], u), early[i]});
+      FitCandidate candidate = candidate_at(i, u);
+      candidate.mse = early[i];
+      candidate.loss = loss(early[i], u);
+      state_.candidates.push_back(std::move(candidate));
     }
     if (state_.candidates.empty()) refuse_starts();
     state_.stage = 0;
@@ -170,6 +173,14 @@ class Fit {
         name_, unknowns_.starts(), horizon_time(0), reason));
   }
 
+  FitCandidate candidate_at(int start, const std::vector<double>& u) const {
+    FitCandidate c;
+    c.start = start;
+    c.u = u;
+    c.motion = motion_;
+    return c;
+  }
+
   /// u, and the initial velocity where it is fitted too.
   std::vector<double> pack(const FitCandidate& c) const {
     std::vector<double> w = c.u;
@@ -181,7 +192,7 @@ class Fit {
     return w;
   }
   FitCandidate unpack(int start, const std::vector<double>& w) const {
-    FitCandidate c{start, w, motion_, kInfinity, kInfinity};
+    FitCandidate c = candidate_at(start, w);
     if (!with_velocity()) return c;
     const double* extra = w.data() + unknowns_.size();
     c.u.resize(unknowns_.size());
@@ -209,41 +220,71 @@ class Fit {
     return g;
   }
 
+  bool going_on(const FitCandidate& c) const { return c.stalled < options_.patience; }
+
   void improve() {
     const FitStage& now = stage();
     const OptimizerOptions settings{now.optimizer, now.rate, now.epochs, options_.clip};
     const int count = static_cast<int>(state_.candidates.size());
     std::vector<std::unique_ptr<Optimizer>> optimizers;
-    for (int i = 0; i < count; ++i) {
-      optimizers.push_back(make_optimizer(settings, pack(state_.candidates[i])));
-      if (!state_.optimizers.empty()) optimizers[i]->unpack(state_.optimizers[i]);
+    for (FitCandidate& c : state_.candidates) {
+      optimizers.push_back(make_optimizer(settings, pack(c)));
+      if (state_.epoch > 0) {
+        optimizers.back()->unpack(c.optimizer);
+      } else {
+        optimizers.back()->inherit(c.optimizer);
+        c.reference = kInfinity;
+        c.stalled = 0;
+      }
     }
     const std::ptrdiff_t frames = frames_of(state_.stage);
+    const std::int64_t work_before = done_;
     while (state_.epoch < now.epochs) {
-      std::vector<FitRecord> records(count);
-      side_by_side(count, [&](int i) {
-        FitCandidate& best = state_.candidates[i];
-        FitCandidate at = unpack(best.start, optimizers[i]->ask());
+      std::vector<int> active;
+      for (int i = 0; i < count; ++i) {
+        if (going_on(state_.candidates[i])) active.push_back(i);
+      }
+      if (active.empty()) break;
+      std::vector<FitRecord> records(active.size());
+      side_by_side(static_cast<int>(active.size()), [&](int k) {
+        FitCandidate& best = state_.candidates[active[k]];
+        Optimizer& optimizer = *optimizers[active[k]];
+        FitCandidate at = unpack(best.start, optimizer.ask());
         const std::vector<double> gradient = evaluate(at, frames);
-        optimizers[i]->tell(at.loss, gradient);
-        records[i] = {state_.stage, best.start, state_.epoch, horizon_time(state_.stage), at.mse};
-        if (at.loss < best.loss) best = at;
+        optimizer.tell(at.loss, gradient);
+        records[k] = {state_.stage, best.start, state_.epoch, horizon_time(state_.stage), at.mse};
+        take(best, at);
+        best.optimizer = optimizer.pack();
       });
+      ++state_.epoch;
       for (const FitRecord& record : records) {
         state_.history.push_back(record);
         if (hooks_.on_record) hooks_.on_record(record);
       }
-      ++state_.epoch;
-      state_.optimizers.clear();
-      for (const auto& optimizer : optimizers) state_.optimizers.push_back(optimizer->pack());
-      checkpoint(count, false);
+      checkpoint(static_cast<std::int64_t>(active.size()), false);
+    }
+    done_ = work_before + std::int64_t(count) * now.epochs;  // what stopped early counts as done
+  }
+
+  /// Keeps the better of `best` and a new evaluation, and counts those that gained next to nothing.
+  static void take(FitCandidate& best, const FitCandidate& at) {
+    if (at.loss < best.loss) {
+      best.u = at.u;
+      best.motion = at.motion;
+      best.loss = at.loss;
+      best.mse = at.mse;
+    }
+    if (best.loss < 0.99 * best.reference) {
+      best.reference = best.loss;
+      best.stalled = 0;
+    } else {
+      ++best.stalled;
     }
   }
 
   /// Keeps the best at the next horizon.
   void next_stage() {
     const int next = state_.stage + 1;
-    state_.optimizers.clear();
     state_.epoch = 0;
     if (next < stages() && frames_of(next) != frames_of(state_.stage)) {
       side_by_side(static_cast<int>(state_.candidates.size()), [&](int i) {
@@ -272,7 +313,11 @@ class Fit {
     }
     const double mse = start_mse(best, stages() - 1);
     const std::vector<double> u = unknowns_.start(best);
-    state_.candidates.push_back({best, u, motion_, loss(mse, u), mse});
+    FitCandidate candidate = candidate_at(best, u);
+    candidate.mse = mse;
+    candidate.loss = loss(mse, u);
+    candidate.optimizer = state_.candidates.front().optimizer;  // rows of one length in the file
+    state_.candidates.push_back(std::move(candidate));
   }
 
   void check_state() const {
@@ -284,9 +329,6 @@ class Fit {
       fail("expected one loss a start and stage");
     }
     if (state_.candidates.empty()) fail("expected candidates, found none");
-    if (!state_.optimizers.empty() && state_.optimizers.size() != state_.candidates.size()) {
-      fail("expected one optimizer a candidate");
-    }
     for (const FitCandidate& c : state_.candidates) {
       if (c.start < 0 || c.start >= unknowns_.starts() ||
           static_cast<int>(c.u.size()) != unknowns_.size()) {

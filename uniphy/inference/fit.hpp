@@ -28,16 +28,20 @@ struct FitOptions {
   double prior = 0;              ///< weight of ‖z‖²/σ² against mse/size²
   double prior_sigma = 1;        ///< σ
   double clip = 10;
+  int patience = 8;  ///< a candidate is left as it is after so many evaluations without 1 % gained
   std::vector<FitStage> stages;  ///< the last one has horizon 1
 };
 
 /// A point that is being improved.
 struct FitCandidate {
-  int start = 0;          ///< row of the starts
-  std::vector<double> u;  ///< best so far in this stage, or where the stage starts
-  RigidMotion motion;     ///< likewise
-  double loss = 0;        ///< of that point: mse/size² and the prior
-  double mse = 0;         ///< m²
+  int start = 0;                  ///< row of the starts
+  std::vector<double> u;          ///< best so far in this stage, or where the stage starts
+  RigidMotion motion;             ///< likewise
+  double loss = 0;                ///< of that point: mse/size² and the prior
+  double mse = 0;                 ///< m²
+  double reference = 0;           ///< loss of which the next 1 % have not been gained yet
+  int stalled = 0;                ///< evaluations since then
+  std::vector<double> optimizer;  ///< packed; of the stage before where this one has not begun
 };
 
 /// Everything that a fit depends on between two evaluations.
@@ -46,7 +50,6 @@ struct FitState {
   int epoch = 0;                  ///< next one within the stage
   std::vector<double> start_mse;  ///< [starts, stages] of every start at the stages' horizons
   std::vector<FitCandidate> candidates;
-  std::vector<std::vector<double>> optimizers;  ///< [candidates] packed; empty between stages
   std::vector<FitRecord> history;
 };
 

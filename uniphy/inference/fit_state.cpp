@@ -1,6 +1,6 @@
 #include <fmt/format.h>
 
-#include <limits>
+#include <algorithm>
 
 #include "ops/kernels/error.hpp"
 #include "uniphy/inference/fit.hpp"
@@ -23,24 +23,31 @@ struct Table {
   }
 };
 
+constexpr std::size_t kHeader = 14;  // columns of a candidate before u
+
 std::vector<double> flat(const FitCandidate& c) {
-  std::vector<double> row{static_cast<double>(c.start), c.loss, c.mse};
+  std::vector<double> row{static_cast<double>(c.start), c.loss, c.mse, c.reference,
+                          static_cast<double>(c.stalled)};
   for (const auto* v : {&c.motion.centre, &c.motion.linear, &c.motion.angular}) {
     row.insert(row.end(), v->data(), v->data() + 3);
   }
   row.insert(row.end(), c.u.begin(), c.u.end());
+  row.insert(row.end(), c.optimizer.begin(), c.optimizer.end());
   return row;
 }
 
-FitCandidate candidate(const double* row, std::size_t size) {
+FitCandidate candidate(const double* row, std::size_t columns, std::size_t unknowns) {
   FitCandidate c;
   c.start = static_cast<int>(row[0]);
   c.loss = row[1];
   c.mse = row[2];
-  std::copy_n(row + 3, 3, c.motion.centre.data());
-  std::copy_n(row + 6, 3, c.motion.linear.data());
-  std::copy_n(row + 9, 3, c.motion.angular.data());
-  c.u.assign(row + 12, row + size);
+  c.reference = row[3];
+  c.stalled = static_cast<int>(row[4]);
+  std::copy_n(row + 5, 3, c.motion.centre.data());
+  std::copy_n(row + 8, 3, c.motion.linear.data());
+  std::copy_n(row + 11, 3, c.motion.angular.data());
+  c.u.assign(row + kHeader, row + kHeader + unknowns);
+  c.optimizer.assign(row + kHeader + unknowns, row + columns);
   return c;
 }
 
@@ -56,15 +63,16 @@ void write_fit_state(const std::filesystem::path& file, const FitState& state,
   writer.attribute("/", "epoch", state.epoch);
   writer.write("start_mse", state.start_mse, {static_cast<std::int64_t>(state.start_mse.size())},
                {"m^2", "of every start at the stages' horizons"});
-  Table candidates, optimizers, history;
+  writer.attribute("/", "unknowns",
+                   state.candidates.empty() ? 0 : static_cast<int>(state.candidates[0].u.size()));
+  Table candidates, history;
   for (const FitCandidate& c : state.candidates) candidates.add(flat(c));
-  for (const auto& packed : state.optimizers) optimizers.add(packed);
   for (const FitRecord& r : state.history) {
     history.add({double(r.stage), double(r.candidate), double(r.epoch), r.horizon, r.mse});
   }
-  writer.write("candidates", candidates.data, candidates.shape,
-               {"1", "start, loss, mse, centre, linear, angular, u"});
-  writer.write("optimizers", optimizers.data, optimizers.shape, {"1", "packed optimizers"});
+  writer.write(
+      "candidates", candidates.data, candidates.shape,
+      {"1", "start, loss, mse, reference, stalled, centre, linear, angular, u, optimizer"});
   writer.write("history", history.data, history.shape,
                {"1", "stage, candidate, epoch, horizon (s), mse (m^2)"});
   writer.commit();
@@ -95,12 +103,12 @@ FitState read_fit_state(const std::filesystem::path& file, const std::string& fi
       visit(data.data() + i * shape[1], static_cast<std::size_t>(shape[1]));
     }
   };
-  rows("candidates", 13, [&](const double* row, std::size_t size) {
-    state.candidates.push_back(candidate(row, size));
-  });
-  rows("optimizers", 1, [&](const double* row, std::size_t size) {
-    state.optimizers.emplace_back(row, row + size);
-  });
+  const auto unknowns = static_cast<std::size_t>(
+      std::clamp<std::int64_t>(reader.attribute_integer("/", "unknowns"), 0, 1 << 20));
+  rows("candidates", static_cast<std::int64_t>(kHeader + unknowns),
+       [&](const double* row, std::size_t columns) {
+         state.candidates.push_back(candidate(row, columns, unknowns));
+       });
   rows("history", 5, [&](const double* row, std::size_t) {
     state.history.push_back(
         {std::int32_t(row[0]), std::int32_t(row[1]), std::int32_t(row[2]), row[3], row[4]});

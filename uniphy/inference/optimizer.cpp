@@ -94,6 +94,8 @@ class Adam : public Optimizer {
     for (Vector* v : {&u_, &best_, &m_, &v_}) p.get_matrix(*v);
   }
 
+  void inherit(const std::vector<double>&) override {}  // its moments have the size of the old loss
+
  private:
   static constexpr double kBeta1 = 0.9, kBeta2 = 0.99;
   OptimizerOptions options_;
@@ -121,7 +123,11 @@ class Bfgs : public Optimizer {
     const Vector g = to_eigen(gradient);
     if (!std::isfinite(f_)) {
       accept(loss, g);
-      restart();
+      if (updates_ > 0) {
+        begin_quasi_newton();
+      } else {
+        restart();
+      }
       return;
     }
     const double slope = g_.dot(direction_);
@@ -134,12 +140,7 @@ class Bfgs : public Optimizer {
     const Vector s = trial_ - x_, y = g - g_;
     accept(loss, g);
     update_inverse(s, y);
-    direction_ = -(inverse_ * g_);
-    if (!(g_.dot(direction_) < 0)) {
-      restart();
-      return;
-    }
-    begin_search();
+    begin_quasi_newton();
   }
 
   std::vector<double> pack() const override {
@@ -151,15 +152,27 @@ class Bfgs : public Optimizer {
   }
 
   void unpack(const std::vector<double>& state) override {
-    const auto n = static_cast<std::size_t>(x_.size());
-    check_size(state, 4 + 4 * n + n * n);
+    check_size(state, packed_size());
     Unpacker p{state};
     for (double* x : {&f_, &step_, &failures_, &updates_}) p.get(*x);
     for (Vector* v : {&trial_, &x_, &g_, &direction_}) p.get_matrix(*v);
     p.get_matrix(inverse_);
   }
 
+  void inherit(const std::vector<double>& state) override {
+    if (state.size() != packed_size()) return;
+    const Vector start = trial_;
+    unpack(state);
+    trial_ = x_ = start;
+    f_ = kInfinity;
+  }
+
  private:
+  std::size_t packed_size() const {
+    const auto n = static_cast<std::size_t>(x_.size());
+    return 4 + 4 * n + n * n;
+  }
+
   void accept(double loss, const Vector& g) {
     f_ = loss;
     x_ = trial_;
@@ -172,6 +185,15 @@ class Bfgs : public Optimizer {
     const double length = g_.norm();
     direction_ = length > 0 ? Vector(-options_.rate / length * g_) : Vector::Zero(g_.size());
     begin_search();
+  }
+
+  void begin_quasi_newton() {
+    direction_ = -(inverse_ * g_);
+    if (g_.dot(direction_) < 0) {
+      begin_search();
+    } else {
+      restart();
+    }
   }
 
   void begin_search() {

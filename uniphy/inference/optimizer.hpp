@@ -24,6 +24,9 @@ class Optimizer {
   /// Everything that the next calls depend on; unpack() continues to the same bits.
   virtual std::vector<double> pack() const = 0;
   virtual void unpack(const std::vector<double>& state) = 0;
+  /// Takes over what the pack() of an earlier optimizer with the same options but for the loss
+  /// knows of the shape of the problem; nothing where the sizes differ.
+  virtual void inherit(const std::vector<double>& state) = 0;
 };
 
 /// Adam (Kingma and Ba 2015, β = 0.9, 0.99 for the few epochs of a fit) with a cosine schedule.

@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "ops/kernels/error.hpp"
+#include "uniphy/data/material_ranges.hpp"
 #include "uniphy/geometry/random.hpp"
 
 namespace uniphy {
@@ -170,25 +171,19 @@ double& law_parameter(kernels::LawDescription& law, const std::string& name) {
 }
 
 std::vector<std::array<double, 2>> default_ranges(kernels::LawId id) {
-  using kernels::LawId;
-  switch (id) {
-    case LawId::elastic:
-    case LawId::fixed_corotated:
-      return {{350, 2595196}, {500, 2580120}};
-    case LawId::newtonian:
-      return {{50, 1e3}, {30, 5e5}};
-    case LawId::plasticine:
-      return {{1e4, 1e6}, {1e4, 3e6}, {5e3, 1e4}};
-    case LawId::sand:
-      return {{2400, 9e6}, {2400, 9e6}, {0.01, 0.4}};
-    case LawId::non_newtonian:
-      return {{1e3, 2e6}, {1e3, 2e6}, {1e3, 2e6}, {0.1, 100}};
-    case LawId::water:
-      return {{500, 2580120}};
-    case LawId::learned:
-      break;
+  // The laws beside the five are elastic at small strain.
+  const bool other = id == kernels::LawId::fixed_corotated || id == kernels::LawId::water;
+  const kernels::LawId like = other ? kernels::LawId::elastic : id;
+  std::vector<std::array<double, 2>> ranges;
+  for (const MaterialRanges& material : default_material_ranges()) {
+    if (material.id != like) continue;
+    for (const std::string& name : kernels::parameter_names(id)) {
+      for (std::size_t k = 0; k < kParameterNames.size(); ++k) {
+        if (name == kParameterNames[k]) ranges.push_back(material.interval[k]);
+      }
+    }
   }
-  return {};
+  return ranges;
 }
 
 }  // namespace uniphy

@@ -1,0 +1,212 @@
+#include "uniphy/identify/identify.hpp"
+
+#include <fmt/format.h>
+#include <malloc.h>
+
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <limits>
+
+#include "ops/kernels/error.hpp"
+#include "uniphy/io/atomic_file.hpp"
+#include "uniphy/io/latent_file.hpp"
+#include "uniphy/io/observation.hpp"
+#include "uniphy/report/interrupt.hpp"
+#include "uniphy/report/plot.hpp"
+#include "uniphy/scene/comparison.hpp"
+
+namespace uniphy {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+/// From here on peak_memory_mb() counts anew, where the kernel allows it.
+void reset_peak_memory() {
+#ifdef __GLIBC__
+  malloc_trim(0);
+#endif
+  std::ofstream("/proc/self/clear_refs") << "5";
+}
+
+/// What the pictures need of a finished material.
+struct Pictured {
+  std::string material;
+  Trajectory observed, fitted, foretold, truth;
+  std::vector<double> best;  ///< over the roll-outs of the result's candidate, m²
+};
+
+/// Best loss so far of the candidate that the result comes from, within each stage.
+std::vector<double> best_so_far(const FitResult& fit) {
+  std::vector<double> best;
+  int stage = -1;
+  for (const FitRecord& r : fit.history) {
+    if (r.candidate != fit.start) continue;
+    const bool first = r.stage != stage;
+    stage = r.stage;
+    best.push_back(first ? r.mse : std::min(best.back(), r.mse));
+  }
+  return best;
+}
+
+Trajectory foretell(const HiddenCase& hidden, const kernels::LawDescription& law) {
+  SceneDescription scene = hidden.other.scene;
+  scene.bodies.front().law = law;
+  return run_scene(scene);
+}
+
+Identified identify_one(const IdentifyOptions& options, std::int64_t material,
+                        const Unknowns& unknowns, RunDirectory& out, Pictured& pictured) {
+  const auto start = std::chrono::steady_clock::now();
+  reset_peak_memory();
+  Identified row;
+  row.material = options.hidden.draw.materials[material].name();
+  row.fit_mse = row.fit_share = row.other_best = row.resim_mse = row.resim_share = kNan;
+  const std::filesystem::path folder = out.file(row.material);
+  make_directory(folder);
+
+  const HiddenCase hidden = draw_hidden_case(options.hidden, material);
+  row.shape = hidden.observed.record.shape;
+  row.other_shape = hidden.other.record.shape;
+  write_observation(folder / "observation.h5", observation_of(hidden));
+
+  // From here on inference knows nothing but that file and the model.
+  const std::string name = (folder / "observation.h5").string();
+  const Observation observation = read_observation(name);
+  std::fprintf(stderr, "%s\n", row.material.c_str());
+  const Inference result = infer(observation, name, unknowns, options.fit, {});
+  write_latent(folder / "latent.h5",
+               latent_of(result, unknowns, options.unknowns.model.string(), out.config_yaml()));
+  write_trajectory(folder / "fitted.h5", result.fitted);
+  plot_chart(folder / "loss.png", loss_chart(result.fit, unknowns, row.material));
+  row.fit_mse = result.fit_mse;
+  row.fit_share = std::sqrt(result.fit_mse) / result.size;
+  row.roll_outs = result.fit.history.size();
+  row.nearest = unknowns.nearest(result.fit.u, 1).front().material;
+  row.other_best = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < unknowns.starts(); ++i) {
+    if (unknowns.label(i) == row.material) continue;
+    row.other_best = std::min(row.other_best, result.fit.start_mse[i]);
+  }
+  row.beats_other = row.fit_mse < row.other_best;
+
+  pictured.material = row.material;
+  pictured.observed = observed_trajectory(observation);
+  pictured.fitted = result.fitted;
+  pictured.best = best_so_far(result.fit);
+  pictured.truth = hidden.other_truth;
+  write_trajectory(folder / "other_truth.h5", hidden.other_truth);
+  pictured.foretold = foretell(hidden, result.fit.law);
+  write_trajectory(folder / "resimulated.h5", pictured.foretold);
+  const TrajectoryComparison comparison =
+      compare_trajectories(pictured.foretold, hidden.other_truth, FrameMatch::all,
+                           "the re-simulation", "the analytic one");
+  row.resim_mse = comparison.position_mse;
+  row.resim_share = comparison.root_over_size;
+  row.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  row.memory_mb = peak_memory_mb();
+  return row;
+}
+
+void add_row(Metrics& metrics, const Identified& row) {
+  const auto set = [&](const char* name, double value) {
+    metrics.set(fmt::format("{}.{}", name, row.material), value);
+  };
+  set("fit_mse", row.fit_mse);
+  set("resim_mse", row.resim_mse);
+  set("fit_beats_other", row.beats_other ? 1 : 0);
+  set("fit_root_over_size", row.fit_share);
+  set("resim_root_over_size", row.resim_share);
+  set("other_best_mse", row.other_best);
+  set("roll_outs", static_cast<double>(row.roll_outs));
+  set("seconds", row.wall_s);
+  set("memory_mb", row.memory_mb);
+}
+
+void draw_pictures(const std::vector<Pictured>& all, RunDirectory& out) {
+  Chart chart;
+  chart.title = "Loss of the result's candidate; it rises where the horizon grows";
+  chart.x_label = "roll-outs with gradients";
+  chart.y_label = "position mse up to the horizon (m^2)";
+  chart.log_y = true;
+  std::vector<ParticlePanel> panels;
+  for (const Pictured& p : all) {
+    Series series;
+    series.label = p.material;
+    for (std::size_t i = 0; i < p.best.size(); ++i) {
+      series.x.push_back(static_cast<double>(i + 1));
+      series.y.push_back(p.best[i]);
+    }
+    chart.series.push_back(series);
+    // Two instants each: a third of the way, and the end.
+    for (const auto& [name, trajectory] :
+         {std::pair<const char*, const Trajectory*>{"observed", &p.observed},
+          {"fitted", &p.fitted},
+          {"re-simulated", &p.foretold},
+          {"true there", &p.truth}}) {
+      if (trajectory->frames == 0) continue;
+      const ParticlePicture strip = frames_picture({{"", trajectory}}, 4);
+      for (const int k : {1, 3}) {
+        panels.push_back(strip.panels[k]);
+        panels.back().caption = fmt::format("{} {}{}", p.material, name, strip.panels[k].caption);
+      }
+    }
+  }
+  plot_chart(out.file("loss.png"), chart);
+  ParticlePicture picture;
+  picture.columns = 8;
+  picture.panels = std::move(panels);
+  plot_particles(out.file("strip.png"), picture);
+}
+
+}  // namespace
+
+std::string identify_table(const std::vector<Identified>& rows) {
+  std::string text =
+      "| material | observed | fit mse (m²) | root/size | best code of another material (m²) | "
+      "re-simulated | mse (m²) | root/size | nearest code | roll-outs | time (s) | memory (MB) |\n"
+      "|---|---|---|---|---|---|---|---|---|---|---|---|\n";
+  for (const Identified& r : rows) {
+    text += fmt::format(
+        "| {} | {} | {:.2e} | {:.3f} % | {:.2e} | {} | {:.2e} | {:.3f} % | {} | {} | {:.1f} | "
+        "{:.0f} |\n",
+        r.material, r.shape, r.fit_mse, 100 * r.fit_share, r.other_best, r.other_shape, r.resim_mse,
+        100 * r.resim_share, r.nearest, r.roll_outs, r.wall_s, r.memory_mb);
+  }
+  return text;
+}
+
+void identify(const IdentifyOptions& options, RunDirectory& out, Metrics& metrics) {
+  const auto unknowns = options.unknowns.load();
+  std::vector<Identified> rows;
+  std::vector<Pictured> pictures;
+  std::string failures;
+  const auto count = static_cast<std::int64_t>(options.hidden.draw.materials.size());
+  for (std::int64_t material = 0; material < count; ++material) {
+    Pictured pictured;
+    Identified row;
+    try {
+      row = identify_one(options, material, *unknowns, out, pictured);
+      pictures.push_back(std::move(pictured));
+    } catch (const Interrupted&) {
+      throw;
+    } catch (const Error& error) {
+      row.material = options.hidden.draw.materials[material].name();
+      row.fit_mse = row.resim_mse = kNan;
+      failures += fmt::format("; {}: {}", row.material, error.what());
+    }
+    add_row(metrics, row);
+    rows.push_back(row);
+  }
+  const std::string table = identify_table(rows);
+  write_text_file(out.file("table.md"), table);
+  std::fputs(table.c_str(), stdout);
+  draw_pictures(pictures, out);
+  if (!failures.empty()) {
+    metrics.write(out.file("metrics.json"));
+    throw Error(failures.substr(2));
+  }
+}
+
+}  // namespace uniphy

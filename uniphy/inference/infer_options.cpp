@@ -1,0 +1,119 @@
+#include "uniphy/inference/infer_options.hpp"
+
+#include <fmt/format.h>
+
+#include "ops/kernels/error.hpp"
+
+namespace uniphy {
+namespace {
+
+const char* parameter_unit(kernels::LawId id, const std::string& name) {
+  if (name == "theta") return "rad";
+  return name == "eta" || (name == "mu" && id == kernels::LawId::newtonian) ? "Pa s" : "Pa";
+}
+
+}  // namespace
+
+FitOptions read_fit_options(Section& config) {
+  FitOptions options;
+  options.dtype = config.choice("dtype", std::string("float32"), {"float32", "float64"},
+                                "precision of the roll-outs");
+
+  Section velocity = config.section(
+      "velocity", "the initial velocity: a rigid motion, from observed positions alone");
+  options.velocity_frames = static_cast<int>(
+      velocity.integer("frames", 1, between(1, 1000), "",
+                       "frames after the first that it is taken from; more where there is noise"));
+  options.refine_velocity =
+      velocity.boolean("refine", false, "fit it together with the material in the last stage");
+
+  Section prior = config.section("prior", "adds weight |z|^2/sigma^2 to mse/size^2");
+  options.prior = prior.real("weight", 0, at_least(0), "", "0: no prior");
+  options.prior_sigma = prior.real("sigma", 1, positive(), "", "width of the prior");
+
+  Section schedule = config.section(
+      "schedule", "stages; each list has one entry a stage, the last one sees all frames");
+  const Range sizes = between(1, 20);
+  const auto horizon =
+      schedule.reals("horizon", std::vector<double>{0.25, 0.5, 1}, Range{0, 1, true}, "",
+                     "share of the time from first contact to the end that is compared", sizes);
+  const auto candidates =
+      schedule.integers("candidates", std::vector<std::int64_t>{8, 4, 2}, between(1, 10000), "",
+                        "points that are improved; the best go on to the next stage", sizes);
+  const auto epochs =
+      schedule.integers("epochs", std::vector<std::int64_t>{8, 12, 40}, between(1, 100000), "",
+                        "roll-outs with gradients of each candidate", sizes);
+  const std::string method = schedule.choice("optimizer", std::string("bfgs"), {"bfgs", "adam"},
+                                             "how candidates are improved");
+  const double rate =
+      schedule.real("rate", 0.1, positive(), "",
+                    "length of the first step (adam: of every step, falling along a cosine), in "
+                    "units of the spread of the training codes");
+  options.patience = static_cast<int>(
+      schedule.integer("patience", 8, at_least(1), "",
+                       "a candidate stops after so many epochs that gain less than 1 %"));
+  options.clip = schedule.real("clip", 10, positive(), "",
+                               "adam: longest gradient, in multiples of their mean length");
+  if (!config.describing()) {
+    if (candidates.size() != horizon.size() || epochs.size() != horizon.size()) {
+      schedule.fail("horizon",
+                    fmt::format("expected lists of one length in horizon, candidates and epochs, "
+                                "found {}, {} and {} entries",
+                                horizon.size(), candidates.size(), epochs.size()));
+    }
+    if (horizon.back() != 1) {
+      schedule.fail("horizon",
+                    fmt::format("expected 1 in the last stage, found {}", horizon.back()));
+    }
+  }
+  for (std::size_t i = 0; i < horizon.size() && i < candidates.size() && i < epochs.size(); ++i) {
+    options.stages.push_back(
+        {horizon[i], static_cast<int>(candidates[i]), static_cast<int>(epochs[i]), method, rate});
+  }
+  return options;
+}
+
+UnknownsSource read_unknowns(Section& config) {
+  UnknownsSource source;
+  Section law = config.section("law", "what is fitted");
+  std::vector<Variant> variants;
+  variants.push_back(
+      {"learned", "the latent code of a trained model; starts from its codes", [&](Section& s) {
+         source.id = kernels::LawId::learned;
+         source.model = s.text("model", std::string("models/pretrained/unified.h5"),
+                               "trained model (model.h5)");
+       }});
+  for (int i = 0; i < static_cast<int>(kernels::LawId::learned); ++i) {
+    const auto id = static_cast<kernels::LawId>(i);
+    variants.push_back(
+        {kernels::law_name(id), "its parameters, as logarithms", [&source, id](Section& s) {
+           source.id = id;
+           const auto defaults = default_ranges(id);
+           source.ranges.clear();
+           for (std::size_t k = 0; k < defaults.size(); ++k) {
+             const std::string& name = kernels::parameter_names(id)[k];
+             source.ranges.push_back(s.interval(name, defaults[k], positive(),
+                                                parameter_unit(id, name),
+                                                "starts are drawn from here"));
+           }
+           source.starts = static_cast<int>(
+               s.integer("starts", 100, between(1, 100000), "", "points that are tried first"));
+           source.seed =
+               static_cast<std::uint64_t>(s.integer("seed", 1, at_least(0), "", "of the starts"));
+         }});
+  }
+  law.variant("type", std::string("learned"), variants, "the law");
+  return source;
+}
+
+std::unique_ptr<const Unknowns> UnknownsSource::load() const {
+  if (id != kernels::LawId::learned) return make_analytic_unknowns(id, ranges, starts, seed);
+  const ModelFile file = read_model(model);
+  if (file.codes() == 0) {
+    throw Error(
+        fmt::format("{}: /latents/z: expected codes to start from, found none", model.string()));
+  }
+  return make_latent_unknowns(file);
+}
+
+}  // namespace uniphy

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "uniphy/config/config.hpp"
+#include "uniphy/inference/fit.hpp"
+
+namespace uniphy {
+
+/// Declares and reads the keys of a fit: schedule, optimizer, precision, prior, velocity.
+FitOptions read_fit_options(Section& config);
+
+/// What is fitted: the latent code of a model, or the parameters of an analytic law.
+struct UnknownsSource {
+  kernels::LawId id = kernels::LawId::learned;
+  std::filesystem::path model;                ///< learned
+  std::vector<std::array<double, 2>> ranges;  ///< analytic, in the order of parameter_names(id)
+  int starts = 0;
+  std::uint64_t seed = 0;
+
+  /// Opens the model. Throws Error that names it.
+  std::unique_ptr<const Unknowns> load() const;
+};
+
+/// Declares and reads the section `law`.
+UnknownsSource read_unknowns(Section& config);
+
+}  // namespace uniphy

@@ -1,0 +1,199 @@
+#include "uniphy/inference/infer_run.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include "uniphy/inference/observed_motion.hpp"
+#include "uniphy/scene/comparison.hpp"
+
+namespace uniphy {
+namespace {
+
+/// FNV-1a, 64 bits.
+class Hash {
+ public:
+  void add(const void* data, std::size_t bytes) {
+    const auto* p = static_cast<const unsigned char*>(data);
+    for (std::size_t i = 0; i < bytes; ++i) value_ = (value_ ^ p[i]) * 0x100000001b3ULL;
+  }
+  void add(const std::vector<double>& v) { add(v.data(), v.size() * sizeof(double)); }
+  void add(const std::string& s) { add(s.data(), s.size()); }
+  std::string text() const { return fmt::format("{:016x}", value_); }
+
+ private:
+  std::uint64_t value_ = 0xcbf29ce484222325ULL;
+};
+
+void add_weights(Hash& hash, const kernels::LawDescription& law) {
+  if (law.weights == nullptr) return;
+  for (const kernels::MlpWeights* network : {&law.weights->projection, &law.weights->stress}) {
+    for (const auto& layer : network->layers) {
+      hash.add(layer.weight);
+      hash.add(layer.bias);
+    }
+  }
+}
+
+}  // namespace
+
+Trajectory observed_trajectory(const Observation& observation) {
+  Trajectory t;
+  t.frames = observation.frames;
+  t.particles = observation.particles;
+  t.body.assign(observation.particles, 0);
+  t.volume = observation.volume;
+  t.mass = observed_mass(observation);
+  t.time = observation.time;
+  for (const double time : observation.time) {
+    t.step.push_back(std::llround((time - observation.time[0]) / observation.dt));
+  }
+  t.x = observation.x;
+  return t;
+}
+
+Inference infer(const Observation& observation, const std::string& name, const Unknowns& unknowns,
+                const FitOptions& options, const FitHooks& hooks) {
+  Inference result;
+  result.fit = fit_observation(observation, name, unknowns, options, hooks);
+  result.size = observed_size(observation);
+  const Trajectory seen = observed_trajectory(observation);
+  result.fitted = seen;
+  result.fitted.x.clear();
+  const ObservedSteps steps = observed_steps(observation, name);
+  const auto objective =
+      make_motion_objective(observation, steps, observed_grid(observation, name), options.dtype);
+  objective->simulate(result.fit.law, result.fit.motion,
+                      [&](std::ptrdiff_t, const std::vector<double>& x) {
+                        result.fitted.x.insert(result.fitted.x.end(), x.begin(), x.end());
+                      });
+  result.fit_mse =
+      compare_trajectories(result.fitted, seen, FrameMatch::all, "the fit", name).position_mse;
+  result.best_start = *std::min_element(result.fit.start_mse.begin(), result.fit.start_mse.end());
+  return result;
+}
+
+LatentFile latent_of(const Inference& inference, const Unknowns& unknowns, const std::string& model,
+                     const std::string& config) {
+  const FitResult& fit = inference.fit;
+  LatentFile file;
+  file.law = kernels::law_name(fit.law.id);
+  file.config = config;
+  if (fit.law.id == kernels::LawId::learned) {
+    file.model = model;
+    file.z = fit.law.z;
+    file.nearest = unknowns.nearest(fit.u, 5);
+  } else {
+    file.analytic = fit.law;
+  }
+  std::copy_n(fit.motion.centre.data(), 3, file.centre.begin());
+  std::copy_n(fit.motion.linear.data(), 3, file.linear.begin());
+  std::copy_n(fit.motion.angular.data(), 3, file.angular.begin());
+  file.history = fit.history;
+  return file;
+}
+
+void add_metrics(Metrics& metrics, const Inference& inference, const Observation& observation,
+                 const Unknowns& unknowns) {
+  const FitResult& fit = inference.fit;
+  metrics.set("fit_mse", inference.fit_mse);
+  metrics.set("fit_root_over_size", std::sqrt(inference.fit_mse) / inference.size);
+  metrics.set("size", inference.size);
+  metrics.set("best_start_mse", inference.best_start);
+  metrics.set("roll_outs", static_cast<double>(fit.history.size()));
+  metrics.set("starts", static_cast<double>(fit.start_mse.size()));
+  metrics.set("starts_failed",
+              static_cast<double>(std::count_if(fit.start_mse.begin(), fit.start_mse.end(),
+                                                [](double mse) { return !std::isfinite(mse); })));
+  if (fit.contact < observation.frames) {
+    metrics.set("contact_s", observation.time[fit.contact] - observation.time[0]);
+  }
+  const char* axes[] = {"x", "y", "z"};
+  for (int k = 0; k < 3; ++k) {
+    metrics.set(fmt::format("velocity.{}", axes[k]), fit.motion.linear[k]);
+    metrics.set(fmt::format("angular_velocity.{}", axes[k]), fit.motion.angular[k]);
+  }
+  metrics.set("nearest.distance", unknowns.nearest(fit.u, 1).front().distance);
+  kernels::LawDescription law = fit.law;
+  for (const std::string& name : kernels::parameter_names(law.id)) {
+    metrics.set("parameter." + name, law_parameter(law, name));
+  }
+}
+
+Chart loss_chart(const FitResult& fit, const Unknowns& unknowns, const std::string& title) {
+  Chart chart;
+  chart.title = title;
+  chart.x_label = "roll-outs of the candidate";
+  chart.y_label = "position mse up to the horizon (m^2)";
+  chart.log_y = true;
+  struct Line {
+    Series series;
+    int stage = -1;
+    double best = 0;
+  };
+  std::map<int, Line> lines;
+  // Stages follow each other along the axis, so that lines of one stage stand above each other.
+  std::map<int, int> length;
+  for (const FitRecord& r : fit.history) {
+    length[r.stage] = std::max(length[r.stage], r.epoch + 1);
+  }
+  std::map<int, int> offset;
+  int sum = 0;
+  for (const auto& [stage, epochs] : length) {
+    offset[stage] = sum;
+    sum += epochs;
+  }
+  for (const FitRecord& r : fit.history) {
+    Line& line = lines[r.candidate];
+    if (line.stage != r.stage) line.best = std::numeric_limits<double>::infinity();
+    line.stage = r.stage;
+    line.best = std::min(line.best, r.mse);
+    line.series.label = fmt::format("start {} ({})", r.candidate, unknowns.label(r.candidate));
+    line.series.x.push_back(offset[r.stage] + r.epoch + 1);
+    line.series.y.push_back(line.best);
+  }
+  for (auto& [start, line] : lines) chart.series.push_back(std::move(line.series));
+  return chart;
+}
+
+ParticlePicture frames_picture(const std::vector<std::pair<std::string, const Trajectory*>>& rows,
+                               int columns) {
+  ParticlePicture picture;
+  picture.columns = columns;
+  for (const auto& [name, trajectory] : rows) {
+    for (int c = 0; c < columns; ++c) {
+      const std::int64_t frame = (trajectory->frames - 1) * c / std::max(1, columns - 1);
+      ParticlePanel panel;
+      panel.caption = fmt::format("{} {:.0f} ms", name, 1e3 * trajectory->time[frame]);
+      panel.x.assign(trajectory->positions(frame),
+                     trajectory->positions(frame) + 3 * trajectory->particles);
+      // Colour follows the particles: height at the first frame.
+      for (std::int64_t p = 0; p < trajectory->particles; ++p) {
+        panel.colour.push_back(trajectory->positions(0)[3 * p + 1]);
+      }
+      picture.panels.push_back(std::move(panel));
+    }
+  }
+  return picture;
+}
+
+std::string fit_fingerprint(const Observation& observation, const Unknowns& unknowns,
+                            const std::string& text) {
+  Hash hash;
+  hash.add(observation.x);
+  hash.add(observation.time);
+  hash.add(observation.volume);
+  hash.add(fmt::format("{} {} {} {} {} {} {}", observation.grid, observation.dt,
+                       observation.gravity[0], observation.gravity[1], observation.gravity[2],
+                       observation.walls, observation.bound));
+  hash.add(std::vector<double>{observation.density});
+  for (int i = 0; i < unknowns.starts(); ++i) hash.add(unknowns.start(i));
+  add_weights(hash, unknowns.law(unknowns.start(0)));
+  hash.add(text);
+  return hash.text();
+}
+
+}  // namespace uniphy

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "uniphy/inference/fit.hpp"
+#include "uniphy/inference/infer_options.hpp"
+#include "uniphy/io/trajectory.hpp"
+#include "uniphy/report/metrics.hpp"
+#include "uniphy/report/plot.hpp"
+
+namespace uniphy {
+
+/// A finished inference and the roll-out of its result.
+struct Inference {
+  FitResult fit;
+  Trajectory fitted;      ///< at the observed frames
+  double fit_mse = 0;     ///< m², of `fitted` against the observation
+  double size = 0;        ///< m, largest side of the observed body
+  double best_start = 0;  ///< m², what the best start reaches over all frames
+};
+
+/// Fits and rolls out once more. Throws Error.
+Inference infer(const Observation& observation, const std::string& name, const Unknowns& unknowns,
+                const FitOptions& options, const FitHooks& hooks);
+
+/// The product of uniphy_infer. `model` is the path that resimulate will look for.
+LatentFile latent_of(const Inference& inference, const Unknowns& unknowns, const std::string& model,
+                     const std::string& config);
+
+/// fit_mse (m²), fit_root_over_size, size, best_start_mse, roll_outs, starts, starts_failed,
+/// contact_s, velocity.{x,y,z}, angular_velocity.{x,y,z}, nearest.distance and, of an analytic law,
+/// parameter.NAME.
+void add_metrics(Metrics& metrics, const Inference& inference, const Observation& observation,
+                 const Unknowns& unknowns);
+
+/// The best mse so far of every start that was followed, over the roll-outs of all stages.
+Chart loss_chart(const FitResult& fit, const Unknowns& unknowns, const std::string& title);
+
+/// `columns` frames of several trajectories of the same number of frames, one row each.
+ParticlePicture frames_picture(const std::vector<std::pair<std::string, const Trajectory*>>& rows,
+                               int columns);
+
+/// A trajectory that holds what was observed.
+Trajectory observed_trajectory(const Observation& observation);
+
+/// 64 bits of everything in the observation and the starts, beside `text`, as hexadecimal digits:
+/// tells whether an interrupted fit can go on.
+std::string fit_fingerprint(const Observation& observation, const Unknowns& unknowns,
+                            const std::string& text);
+
+}  // namespace uniphy
