@@ -35,11 +35,13 @@ UNIPHY_INLINE MaskOf<V> rotate(Mat3<V>& a, Mat3<V>& v, int p, int q) {
   // rounding of the matrix that a rank-deficient F would be rotated down to denormals for nothing.
   const V eps2(std::numeric_limits<T>::epsilon() * std::numeric_limits<T>::epsilon());
   const MaskOf<V> active = gamma * gamma > eps2 * fma(V(T(4)) * alpha, beta, eps2);
-  const V safe = select<V>(active, gamma, one);
-  const V zeta = (beta - alpha) / (safe + safe);
-  const V magnitude = one / (lane_abs(zeta) + lane_sqrt(fma(zeta, zeta, one)));
-  V t = select<V>(zeta < zero, -magnitude, magnitude);
-  t = select<V>(active, t, zero);
+  // The smaller root of t² + 2ζt − 1 = 0, ζ = h/γ, as t = ±γ/(|h| + √(h² + γ²)); positive at h = 0.
+  // γ of an active lane is far from underflow.
+  const V h = (beta - alpha) * V(T(0.5));
+  const V reach = lane_abs(h) + lane_sqrt(fma(h, h, gamma * gamma));
+  const V tied = select<V>(h < zero, -gamma, lane_abs(gamma));
+  const V turn = select<V>(h > zero, gamma, tied) / select<V>(active, reach, one);
+  const V t = select<V>(active, turn, zero);
   const V c = one / lane_sqrt(fma(t, t, one));
   const V s = c * t;
   for (int i = 0; i < 3; ++i) {
