@@ -46,14 +46,12 @@ SceneDescription read_scene_settings(Section& scene) {
                                "share of the stable time step that auto takes");
   settings.steps = scene.integer("steps", 1000, between(0, 1e9), "", "number of time steps");
   settings.duration = scene.real_or("none", "duration", std::optional<double>(), at_least(0), "s",
-                                    "simulated time, in place of steps");
-  if (settings.duration && scene.has("steps")) {
-    scene.fail("duration", "expected either steps or duration, found both");
-  }
+                                    "simulated time; where it is given, steps does not count");
   settings.frame_stride =
       scene.integer("frame_stride", 5, between(1, 1e9), "", "steps from frame to frame");
   const std::array<double, 3> gravity =
-      scene.vector3("gravity", std::array<double, 3>{0, -9.8, 0}, any_number(), "m/s^2", "");
+      scene.vector3("gravity", std::array<double, 3>{0, -9.8, 0}, any_number(), "m/s^2",
+                    "acceleration of everything");
   std::copy(gravity.begin(), gravity.end(), settings.grid.gravity);
   const std::string walls =
       scene.choice("walls", std::string("freeslip"), {"freeslip", "noslip"},

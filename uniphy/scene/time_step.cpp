@@ -7,9 +7,10 @@
 namespace uniphy {
 namespace {
 
-// τ₁₁ of F = diag(1 + strain, 1, 1), C = diag(rate, 0, 0).
-double stress(const kernels::LawKernel<double>& law, double strain, double rate) {
-  double F[9] = {1 + strain, 0, 0, 0, 1, 0, 0, 0, 1};
+// τ₁₁ of F = (1 − pressed) diag(1 − strain, 1, 1), C = diag(rate, 0, 0).
+double stress(const kernels::LawKernel<double>& law, double pressed, double strain, double rate) {
+  const double side = 1 - pressed;
+  double F[9] = {side * (1 - strain), 0, 0, 0, side, 0, 0, 0, side};
   const double C[9] = {rate, 0, 0, 0, 0, 0, 0, 0, 0};
   double F_proj[9], tau[9];
   const double dt = 1e-4;  // s, only viscoplastic flow depends on it
@@ -21,14 +22,19 @@ double stress(const kernels::LawKernel<double>& law, double strain, double rate)
 
 Stiffness estimate_stiffness(const kernels::LawDescription& description) {
   const auto law = kernels::make_law<double>(description);
-  const double rest = stress(*law, 0, 0);
+  const double rest = stress(*law, 0, 0, 0);
   Stiffness stiffness;
   for (const double strain : {1e-4, 1e-3, 1e-2}) {
-    const double modulus = std::abs(stress(*law, -strain, 0) - rest) / strain;
+    const double modulus = std::abs(stress(*law, 0, strain, 0) - rest) / strain;
     stiffness.wave_modulus = std::max(stiffness.wave_modulus, modulus);
   }
+  // Sand flows under the slightest uniaxial strain; under pressure it is as stiff as it gets.
+  const double pressed = 1e-3, strain = 1e-5;
+  const double tangent =
+      std::abs(stress(*law, pressed, strain, 0) - stress(*law, pressed, 0, 0)) / strain;
+  stiffness.wave_modulus = std::max(stiffness.wave_modulus, tangent);
   for (const double rate : {1.0, -1.0}) {
-    const double viscosity = std::abs(stress(*law, 0, rate) - rest);
+    const double viscosity = std::abs(stress(*law, 0, 0, rate) - rest);
     stiffness.viscosity = std::max(stiffness.viscosity, viscosity);
   }
   return stiffness;

@@ -12,7 +12,8 @@ struct Stiffness {
 
 /// By differences of the law's own stress, so that it serves learned laws as well: the steepest
 /// secant over compressions of 1e-4, 1e-3 and 1e-2 (compressed, because sand bears no tension and
-/// fluids stiffen), and over stretching rates of ±1/s. Compares to the closed forms
+/// fluids stiffen), or the tangent under an even compression of 1e-3, whichever is larger, and
+/// stretching rates of ±1/s. Compares to the closed forms
 ///   λ + 2μ  elastic, plasticine, sand, non_newtonian, fixed_corotated
 ///   7 (⅔μ + λ), viscosity μ  newtonian          λ  water
 /// to within the stiffening over 1 % of compression (7 % for newtonian).
