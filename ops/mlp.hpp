@@ -1,0 +1,29 @@
+#pragma once
+
+#include <torch/torch.h>
+
+#include <vector>
+
+#include "ops/kernels/learned_law_weights.hpp"
+
+namespace uniphy::ops {
+
+/// One linear layer: weight [out, in], bias [out].
+struct LinearLayer {
+  torch::Tensor weight;
+  torch::Tensor bias;
+};
+
+/// A multilayer perceptron as one op: x [S, in] → [S, out], differentiable by x and by every weight
+/// and bias. The activation follows every layer but the last. The fused kernel walks tiles of
+/// particles whose activations stay in the cache and recomputes them in the backward pass, so that
+/// the graph keeps x alone. Sums over samples have one order on any number of threads. float32 or
+/// float64, all tensors alike; throws Error quoting the expected and the found shape or type.
+torch::Tensor mlp(const torch::Tensor& x, const std::vector<LinearLayer>& layers,
+                  kernels::Activation activation);
+
+/// The same in plain tensor operations.
+torch::Tensor mlp_reference(const torch::Tensor& x, const std::vector<LinearLayer>& layers,
+                            kernels::Activation activation);
+
+}  // namespace uniphy::ops

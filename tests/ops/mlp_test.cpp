@@ -1,0 +1,99 @@
+// The fused network op against plain tensors and central differences.
+
+#include "ops/mlp.hpp"
+
+#include <ATen/Parallel.h>
+#include <gtest/gtest.h>
+#include <torch/torch.h>
+
+#include "ops/kernels/error.hpp"
+
+namespace uniphy::ops {
+namespace {
+
+using torch::Tensor;
+
+std::vector<LinearLayer> layers(std::vector<std::int64_t> widths, torch::Dtype type) {
+  torch::manual_seed(4);
+  std::vector<LinearLayer> result;
+  for (std::size_t k = 0; k + 1 < widths.size(); ++k)
+    result.push_back({(torch::randn({widths[k + 1], widths[k]}, type) /
+                       std::sqrt(double(widths[k]))).requires_grad_(),
+                      torch::randn({widths[k + 1]}, type).requires_grad_()});
+  return result;
+}
+
+std::vector<Tensor> leaves(const Tensor& x, const std::vector<LinearLayer>& l) {
+  std::vector<Tensor> all{x};
+  for (const LinearLayer& layer : l) {
+    all.push_back(layer.weight);
+    all.push_back(layer.bias);
+  }
+  return all;
+}
+
+class MlpTest : public ::testing::TestWithParam<kernels::Activation> {};
+
+TEST_P(MlpTest, ValueAndGradientsMatchPlainTensors) {
+  for (const auto& widths : {std::vector<std::int64_t>{11, 20, 33, 5}, {7, 2}, {3, 128, 1}}) {
+    for (const std::int64_t samples : {1, 64, 700}) {
+      const auto l = layers(widths, torch::kFloat64);
+      const Tensor x = torch::randn({samples, widths.front()}, torch::kFloat64).requires_grad_();
+      const Tensor seed = torch::randn({samples, widths.back()}, torch::kFloat64);
+      const Tensor y = mlp(x, l, GetParam()), expected = mlp_reference(x, l, GetParam());
+      EXPECT_LE((y - expected).abs().max().item<double>(), 1e-12);
+      const auto got = torch::autograd::grad({y}, leaves(x, l), {seed});
+      const auto want = torch::autograd::grad({expected}, leaves(x, l), {seed});
+      for (std::size_t k = 0; k < got.size(); ++k) {
+        EXPECT_GT(want[k].norm().item<double>(), 0);
+        EXPECT_LE(((got[k] - want[k]).norm() / want[k].norm()).item<double>(), 1e-12) << k;
+      }
+    }
+  }
+}
+
+TEST_P(MlpTest, SameBitsOnOneThreadAndTwo) {
+  const auto l = layers({11, 32, 32, 5}, torch::kFloat32);
+  const Tensor x = torch::randn({3001, 11}).requires_grad_();
+  std::vector<std::vector<Tensor>> results;
+  const int threads = at::get_num_threads();
+  for (const int n : {1, 2}) {
+    at::set_num_threads(n);
+    const Tensor y = mlp(x, l, GetParam());
+    results.push_back(torch::autograd::grad({y}, leaves(x, l), {torch::ones_like(y)}));
+    results.back().push_back(y.detach());
+  }
+  at::set_num_threads(threads);
+  for (std::size_t k = 0; k < results[0].size(); ++k)
+    EXPECT_TRUE(torch::equal(results[0][k], results[1][k])) << k;
+}
+
+INSTANTIATE_TEST_SUITE_P(Activations, MlpTest,
+                         ::testing::Values(kernels::Activation::gelu, kernels::Activation::silu,
+                                           kernels::Activation::squareplus),
+                         [](const auto& info) { return kernels::activation_name(info.param); });
+
+TEST(Mlp, RefusesWhatDoesNotFit) {
+  const auto l = layers({4, 8, 2}, torch::kFloat32);
+  try {
+    mlp(torch::zeros({3, 5}), l, kernels::Activation::silu);
+    FAIL();
+  } catch (const Error& e) {
+    EXPECT_NE(std::string(e.what()).find("expected a weight [out, 5]"), std::string::npos)
+        << e.what();
+  }
+  EXPECT_THROW(mlp(torch::zeros({4}), l, kernels::Activation::silu), Error);
+  EXPECT_THROW(mlp(torch::zeros({3, 4}, torch::kFloat64), l, kernels::Activation::silu), Error);
+  EXPECT_THROW(mlp(torch::zeros({3, 4}), {}, kernels::Activation::silu), Error);
+}
+
+TEST(Mlp, UndefinedGradientsStayUndefined) {
+  const auto l = layers({4, 8, 2}, torch::kFloat32);
+  const Tensor x = torch::randn({3, 4});  // no gradient asked for
+  mlp(x, l, kernels::Activation::silu).sum().backward();
+  EXPECT_FALSE(x.grad().defined());
+  EXPECT_TRUE(l[0].weight.grad().defined());
+}
+
+}  // namespace
+}  // namespace uniphy::ops

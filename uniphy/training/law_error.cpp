@@ -1,0 +1,82 @@
+#include "uniphy/training/law_error.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "ops/kernels/law.hpp"
+
+namespace uniphy {
+namespace {
+
+double squared_distance(const double* a, const double* b, std::int64_t count) {
+  double sum = 0;
+  for (std::int64_t k = 0; k < count; ++k) sum += (a[k] - b[k]) * (a[k] - b[k]);
+  return sum;
+}
+
+double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  const std::size_t n = values.size();
+  return n % 2 ? values[n / 2] : 0.5 * (values[n / 2 - 1] + values[n / 2]);
+}
+
+}  // namespace
+
+std::vector<LawError> law_errors(const Dataset& data,
+                                 std::shared_ptr<const kernels::LearnedLawWeights> weights,
+                                 const std::vector<double>& latents) {
+  const std::int64_t n = std::int64_t(data.trajectories.size());
+  const std::int64_t size = weights->latent_size;
+  const auto stress_only = kernels::without_projection(*weights);
+  std::vector<LawError> errors(std::size_t(n), LawError{});
+  for (std::int64_t i = 0; i < n; ++i) {
+    kernels::LawDescription description;
+    description.id = kernels::LawId::learned;
+    description.weights = weights;
+    description.z.assign(latents.begin() + i * size, latents.begin() + (i + 1) * size);
+    const auto law = kernels::make_law<double>(description);
+    const std::int64_t count = data.first[i + 1] - data.first[i];
+    if (count == 0) continue;
+    const double* F = data.samples.F.data() + 9 * data.first[i];
+    const double* F_proj = data.samples.F_proj.data() + 9 * data.first[i];
+    const double* C = data.samples.C.data() + 9 * data.first[i];
+    const double* tau = data.samples.tau.data() + 9 * data.first[i];
+    std::vector<double> projected(std::size_t(9 * count)), stress(projected.size()),
+        unused(projected.size());
+    const double dt = data.trajectories[i].dt;
+    law->evaluate(count, dt, {F, 9, 1}, {C, 9, 1}, {projected.data(), 9, 1}, {unused.data(), 9, 1});
+    // The stress is asked at the true projected F, so that one error does not count twice.
+    description.weights = stress_only;
+    kernels::make_law<double>(description)
+        ->evaluate(count, dt, {F_proj, 9, 1}, {C, 9, 1}, {unused.data(), 9, 1},
+                   {stress.data(), 9, 1});
+    const std::vector<double> zero(projected.size(), 0.0);
+    const double of_stress = squared_distance(stress.data(), tau, 9 * count);
+    const double stress_size = squared_distance(zero.data(), tau, 9 * count);
+    const double of_projection = squared_distance(projected.data(), F_proj, 9 * count);
+    const double change = squared_distance(F_proj, F, 9 * count);
+    errors[i].stress = std::sqrt(of_stress / std::max(stress_size, 1e-300));
+    errors[i].projection =
+        change > 0 ? std::sqrt(of_projection / change)
+                   : std::sqrt(of_projection / double(9 * count));
+  }
+  return errors;
+}
+
+void report_law_errors(const Dataset& data, const std::vector<LawError>& errors,
+                       const std::string& prefix, Metrics& metrics) {
+  std::map<std::string, std::vector<double>> stress, projection;
+  for (std::size_t i = 0; i < errors.size(); ++i) {
+    stress[data.trajectories[i].material].push_back(errors[i].stress);
+    projection[data.trajectories[i].material].push_back(errors[i].projection);
+  }
+  for (const auto& [name, values] : {std::pair{"stress_error", &stress},
+                                     std::pair{"projection_error", &projection}})
+    for (const auto& [material, list] : *values) {
+      const std::string key = prefix + name + "." + material;
+      metrics.set(key, median(list));
+      metrics.set(key + ".worst", *std::max_element(list.begin(), list.end()));
+    }
+}
+
+}  // namespace uniphy

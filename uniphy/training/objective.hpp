@@ -1,0 +1,47 @@
+#pragma once
+
+#include <torch/torch.h>
+
+#include <vector>
+
+#include "uniphy/training/law_columns.hpp"
+#include "uniphy/training/networks.hpp"
+
+namespace uniphy {
+
+/// Squared errors of a batch, [N, m] each, relative to
+///   ‖τ‖² + (floor · RMS of the trajectory)²          (stress)
+///   decrease² + (floor · RMS of the trajectory)²     (projection; where the trajectory's own RMS is
+///                                                     0, an elastic one, ‖ε‖² takes its place)
+struct LawErrors {
+  torch::Tensor stress;
+  torch::Tensor projection;
+};
+
+/// The differentiable errors of the learned law on samples grouped by trajectory; the loss of
+/// Algorithm 1 and of a latent fit.
+class Objective {
+ public:
+  /// Copies the columns into a tensor.
+  Objective(const LawColumns& columns, kernels::LawForm form, double floor);
+
+  /// rows: [N, m] sample indices, row i of trajectory scale_rows[i]; z: [N, latent_size].
+  LawErrors errors(const Networks& networks, const torch::Tensor& z, const torch::Tensor& rows,
+                   const torch::Tensor& scale_rows) const;
+
+  /// mean log(1 + error/δ) of both kinds, a logarithm so that no trajectory drowns the others.
+  static torch::Tensor robust_mean(const torch::Tensor& errors, double delta);
+
+ private:
+  LawErrors isotropic(const Networks& networks, const torch::Tensor& z, const torch::Tensor& batch,
+                      const torch::Tensor& scale) const;
+  LawErrors seed(const Networks& networks, const torch::Tensor& z, const torch::Tensor& batch,
+                 const torch::Tensor& scale) const;
+
+  kernels::LawForm form_;
+  double floor_;
+  torch::Tensor columns_;  ///< [S, columns]
+  torch::Tensor scales_;   ///< [N, 3]: stress, strain, decrease
+};
+
+}  // namespace uniphy

@@ -1,0 +1,168 @@
+#include "uniphy/training/trainer.hpp"
+
+#include <ATen/CPUGeneratorImpl.h>
+
+#include <cmath>
+
+#include "uniphy/report/interrupt.hpp"
+#include "uniphy/report/progress.hpp"
+#include "uniphy/training/batches.hpp"
+#include "uniphy/training/training_checkpoint.hpp"
+
+namespace uniphy {
+namespace {
+
+using torch::Tensor;
+
+constexpr std::int64_t kReportEvery = 100;
+
+/// z before training. The scale coordinates start at the trajectory's own stress and strain, so
+/// that both networks see numbers near one from the first step; the others start small.
+Tensor initial_latents(const LawColumns& columns, const NetworkOptions& network,
+                       torch::Generator& generator) {
+  const std::int64_t n = std::int64_t(columns.scales.size());
+  Tensor z = torch::randn({n, network.latent_size}, generator, torch::kFloat32) * 0.1;
+  for (std::int64_t i = 0; i < n; ++i) {
+    const TrajectoryScale& s = columns.scales[i];
+    if (s.stress > 0)
+      z[i][0] = std::log(s.stress / kernels::kStressScale) / kernels::kStressRate;
+    if (network.latent_size > 1 && network.form == kernels::LawForm::isotropic && s.strain > 0)
+      z[i][1] = std::log(std::min(std::max(s.strain, 1e-3), 0.5) / kernels::kStrainScale) /
+                kernels::kStrainRate;
+  }
+  return z.requires_grad_();
+}
+
+double cosine(double rate, std::int64_t step, std::int64_t steps) {
+  // A short warm-up: AdamW's first steps are as large as the rate whatever the gradient.
+  const double warm = std::min(1.0, double(step + 1) / 100.0);
+  return warm * rate * 0.5 * (1 + std::cos(M_PI * double(step) / double(steps)));
+}
+
+void set_rate(torch::optim::Optimizer& optimizer, std::size_t group, double rate) {
+  static_cast<torch::optim::AdamWOptions&>(optimizer.param_groups()[group].options()).lr(rate);
+}
+
+double median_of(const Tensor& values) { return values.median().item<double>(); }
+
+torch::optim::AdamW make_optimizer(const Networks& networks, const Tensor& z,
+                                   const TrainingOptions& o) {
+  const auto options = [](double rate, double decay) {
+    return std::make_unique<torch::optim::AdamWOptions>(
+        torch::optim::AdamWOptions(rate).weight_decay(decay).betas({0.9, 0.99}));
+  };
+  std::vector<torch::optim::OptimizerParamGroup> groups;
+  groups.emplace_back(networks.parameters(), options(o.learning_rate, o.weight_decay));
+  groups.emplace_back(std::vector<Tensor>{z}, options(o.learning_rate * o.latent_rate, 0.0));
+  return torch::optim::AdamW(groups);
+}
+
+}  // namespace
+
+TrainingResult train(const Dataset& data, const TrainingOptions& o,
+                     const std::filesystem::path& checkpoint) {
+  const LawColumns columns = law_columns(data, o.network.form);
+  const Objective objective(columns, o.network.form, o.error_floor);
+  const BatchSampler sampler(data, o.seed);
+  const std::int64_t n = sampler.trajectories();
+  torch::Generator generator = torch::make_generator<at::CPUGeneratorImpl>(o.seed);
+  TrainingResult result;
+  result.networks = Networks::random(o.network, generator);
+  result.z = initial_latents(columns, o.network, generator);
+  torch::optim::AdamW optimizer = make_optimizer(result.networks, result.z, o);
+  TrainingCheckpoint state(checkpoint, data, o, result, optimizer);
+  std::int64_t step = state.load();
+  const Tensor all = torch::arange(n);
+  const std::vector<Tensor> parameters = result.networks.parameters();
+
+  catch_interrupts();
+  Progress progress("train", o.steps, "steps");
+  for (; step < o.steps; ++step) {
+    if (interrupt_requested()) {
+      state.save(step);
+      throw_if_interrupted();
+    }
+    set_rate(optimizer, 0, cosine(o.learning_rate, step, o.steps));
+    set_rate(optimizer, 1, cosine(o.learning_rate * o.latent_rate, step, o.steps));
+    optimizer.zero_grad();
+    const LawErrors errors = objective.errors(result.networks, result.z,
+                                              sampler.rows(step, o.batch_per_trajectory), all);
+    const Tensor prior = result.z.pow(2).sum(1).mean() / (o.latent_sigma * o.latent_sigma);
+    const Tensor loss = Objective::robust_mean(errors.stress, o.delta) +
+                        Objective::robust_mean(errors.projection, o.delta) + prior * 1e-2;
+    loss.backward();
+    torch::nn::utils::clip_grad_norm_(parameters, o.clip);
+    optimizer.step();
+    if (step % kReportEvery == 0 || step + 1 == o.steps) {
+      result.history.push_back({step, loss.item<double>(),
+                                median_of(errors.stress.detach().mean(1).sqrt()),
+                                median_of(errors.projection.detach().mean(1).sqrt())});
+      const TrainingPoint& p = result.history.back();
+      char note[96];
+      std::snprintf(note, sizeof note, "loss %.4f, stress %.2e, projection %.2e", p.loss,
+                    p.stress_error, p.projection_error);
+      progress.update(step, note);
+    }
+    if ((step + 1) % o.checkpoint_every == 0) state.save(step + 1);
+  }
+  progress.finish();
+  return result;
+}
+
+Tensor fit_latents(const Dataset& data, const Networks& networks, const Tensor& training_z,
+                   const LatentFitOptions& o) {
+  const Objective objective(law_columns(data, networks.options.form), networks.options.form,
+                            o.error_floor);
+  const BatchSampler sampler(data, o.seed);
+  const std::int64_t n = sampler.trajectories(), codes = training_z.size(0);
+  const std::int64_t starts = std::min(o.starts, codes);
+  const auto loss_of = [&](const Tensor& z, const Tensor& rows, const Tensor& of) {
+    const LawErrors e = objective.errors(networks, z, rows, of);
+    return torch::log1p(e.stress / o.delta).mean(1) + torch::log1p(e.projection / o.delta).mean(1);
+  };
+  // Which training codes answer best, a code at a time against all trajectories.
+  Tensor scores = torch::empty({codes, n});
+  {
+    torch::NoGradGuard no_grad;
+    const Tensor rows = sampler.rows(-1, 64), of = torch::arange(n);
+    for (std::int64_t k = 0; k < codes; ++k)
+      scores[k] = loss_of(training_z[k].unsqueeze(0).expand({n, -1}), rows, of);
+  }
+  const Tensor best = std::get<1>(scores.topk(starts, 0, /*largest=*/false));  // [starts, n]
+  Tensor z = training_z.detach().index_select(0, best.reshape({-1})).clone().requires_grad_();
+  const Tensor of = torch::arange(n).repeat({starts});
+  torch::optim::Adam optimizer({z}, torch::optim::AdamOptions(o.learning_rate).betas({0.9, 0.99}));
+  Progress progress("fit latents", o.steps, "steps");
+  for (std::int64_t step = 0; step < o.steps; ++step) {
+    throw_if_interrupted();
+    static_cast<torch::optim::AdamOptions&>(optimizer.param_groups()[0].options())
+        .lr(cosine(o.learning_rate, step, o.steps));
+    optimizer.zero_grad();
+    const Tensor rows = sampler.rows(step, o.batch_per_trajectory).repeat({starts, 1});
+    const Tensor prior = z.pow(2).sum() / (o.latent_sigma * o.latent_sigma);
+    (loss_of(z, rows, of).sum() + prior * 1e-2).backward();
+    optimizer.step();
+    progress.update(step + 1);
+  }
+  progress.finish();
+  torch::NoGradGuard no_grad;
+  const Tensor final_scores = loss_of(z, sampler.rows(-2, 256).repeat({starts, 1}), of);
+  const Tensor winner = final_scores.view({starts, n}).argmin(0);  // [n]
+  return z.detach().index_select(0, winner * n + torch::arange(n));
+}
+
+ModelFile model_file(const Networks& networks, const Tensor& z, const Dataset& data,
+                     const std::string& config) {
+  ModelFile model;
+  model.weights = networks.weights();
+  const Tensor codes = z.detach().to(torch::kFloat64).contiguous();
+  model.latents.assign(codes.data_ptr<double>(), codes.data_ptr<double>() + codes.numel());
+  for (const TrajectoryRecord& t : data.trajectories) {
+    model.materials.push_back(t.material);
+    model.parameters.push_back(t.parameters);
+  }
+  model.config = config;
+  return model;
+}
+
+}  // namespace uniphy

@@ -1,0 +1,131 @@
+#include "uniphy/training/training_checkpoint.hpp"
+
+#include <fmt/format.h>
+
+#include "ops/kernels/error.hpp"
+
+namespace uniphy {
+namespace {
+
+/// FNV-1a over the bytes of the numbers that decide the run.
+class Hash {
+ public:
+  void add(const void* data, std::size_t bytes) {
+    const auto* at = static_cast<const unsigned char*>(data);
+    for (std::size_t i = 0; i < bytes; ++i) value_ = (value_ ^ at[i]) * 1099511628211ULL;
+  }
+  void add(const std::vector<double>& v) { add(v.data(), v.size() * sizeof(double)); }
+  std::uint64_t value() const { return value_; }
+
+ private:
+  std::uint64_t value_ = 14695981039346656037ULL;
+};
+
+std::string fingerprint(const Dataset& data, const TrainingOptions& o) {
+  Hash hash;
+  hash.add(data.samples.F);
+  hash.add(data.samples.F_proj);
+  hash.add(data.samples.C);
+  hash.add(data.samples.tau);
+  hash.add(data.first.data(), data.first.size() * sizeof(data.first[0]));
+  return fmt::format(
+      "{} {} latent {} layers {} width {} seed {} steps {} batch {} rate {} x {} decay {} sigma {} "
+      "floor {} delta {} clip {} data {:016x}",
+      kernels::form_name(o.network.form), kernels::activation_name(o.network.activation),
+      o.network.latent_size, o.network.hidden_layers, o.network.width, o.seed, o.steps,
+      o.batch_per_trajectory, o.learning_rate, o.latent_rate, o.weight_decay, o.latent_sigma,
+      o.error_floor, o.delta, o.clip, hash.value());
+}
+
+}  // namespace
+
+TrainingCheckpoint::TrainingCheckpoint(std::filesystem::path file, const Dataset& data,
+                                       const TrainingOptions& options, TrainingResult& state,
+                                       torch::optim::AdamW& optimizer)
+    : file_(std::move(file)),
+      fingerprint_(fingerprint(data, options)),
+      state_(state),
+      optimizer_(optimizer) {}
+
+void TrainingCheckpoint::save(std::int64_t step) const {
+  torch::serialize::OutputArchive archive;
+  archive.write("format", c10::IValue("uniphy-training"));
+  archive.write("fingerprint", c10::IValue(fingerprint_));
+  archive.write("step", c10::IValue(step));
+  archive.write("z", state_.z.detach());
+  const std::vector<torch::Tensor> parameters = state_.networks.parameters();
+  for (std::size_t k = 0; k < parameters.size(); ++k)
+    archive.write("parameter_" + std::to_string(k), parameters[k].detach());
+  torch::Tensor history = torch::empty({std::int64_t(state_.history.size()), 4}, torch::kFloat64);
+  double* at = history.data_ptr<double>();
+  for (const TrainingPoint& p : state_.history) {
+    *at++ = double(p.step);
+    *at++ = p.loss;
+    *at++ = p.stress_error;
+    *at++ = p.projection_error;
+  }
+  archive.write("history", history);
+  torch::serialize::OutputArchive moments;
+  optimizer_.save(moments);
+  archive.write("optimizer", moments);
+  const std::filesystem::path temporary = file_.string() + ".tmp";
+  try {
+    archive.save_to(temporary.string());
+    std::filesystem::rename(temporary, file_);
+  } catch (const std::exception& e) {
+    throw Error(file_.string() + ": cannot write the training checkpoint: " +
+                std::string(e.what()).substr(0, 200));
+  }
+}
+
+std::int64_t TrainingCheckpoint::load() {
+  if (!std::filesystem::exists(file_)) return 0;
+  torch::serialize::InputArchive archive;
+  c10::IValue format, fingerprint, step;
+  try {
+    archive.load_from(file_.string());
+    archive.read("format", format);
+    archive.read("fingerprint", fingerprint);
+    archive.read("step", step);
+  } catch (const std::exception&) {
+    throw Error(file_.string() +
+                ": expected a training checkpoint, found something else or a truncated file; "
+                "remove it to start anew");
+  }
+  if (!format.isString() || format.toStringRef() != "uniphy-training" || !fingerprint.isString() ||
+      !step.isInt())
+    throw Error(file_.string() + ": expected a training checkpoint, found another archive");
+  if (fingerprint.toStringRef() != fingerprint_)
+    throw Error(file_.string() + ": the checkpoint belongs to another run: expected \"" +
+                fingerprint_ + "\", found \"" + fingerprint.toStringRef() +
+                "\"; remove it or choose another --out");
+  try {
+    torch::NoGradGuard no_grad;
+    const auto restore = [&archive](const std::string& name, torch::Tensor into) {
+      torch::Tensor value;
+      archive.read(name, value);
+      if (value.sizes() != into.sizes()) throw Error(name + " has another shape");
+      into.copy_(value);
+    };
+    restore("z", state_.z);
+    const std::vector<torch::Tensor> parameters = state_.networks.parameters();
+    for (std::size_t k = 0; k < parameters.size(); ++k)
+      restore("parameter_" + std::to_string(k), parameters[k]);
+    torch::Tensor history;
+    archive.read("history", history);
+    state_.history.clear();
+    for (std::int64_t k = 0; k < history.size(0); ++k) {
+      const double* row = history.data_ptr<double>() + 4 * k;
+      state_.history.push_back({std::int64_t(row[0]), row[1], row[2], row[3]});
+    }
+    torch::serialize::InputArchive moments;
+    archive.read("optimizer", moments);
+    optimizer_.load(moments);
+  } catch (const std::exception& e) {
+    throw Error(file_.string() + ": damaged training checkpoint (" +
+                std::string(e.what()).substr(0, 120) + "); remove it to start anew");
+  }
+  return step.toInt();
+}
+
+}  // namespace uniphy
