@@ -48,22 +48,30 @@ struct NodeRow {
   UNIPHY_INLINE void store(T* at) const {
     for (int p = 0; p < kParts; ++p) *reinterpret_cast<Unaligned*>(at + p * kLanes) = part[p];
   }
-  /// The four numbers at `at` once for each node.
+  /// The four numbers at `at` once for each node. Intrinsics where the compiler would go through
+  /// memory and wait for the store.
   static UNIPHY_INLINE NodeRow repeat4(const T* at) {
     NodeRow r;
+#if defined(__AVX512F__)
     if constexpr (kLanes == 16) {
-      typedef T Four __attribute__((vector_size(4 * sizeof(T)), aligned(alignof(T)), may_alias));
-      const Four a = *reinterpret_cast<const Four*>(at);
-      r.part[0] = __builtin_shufflevector(a, a, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3);
-    } else if constexpr (kLanes == 8) {
-      typedef T Four __attribute__((vector_size(4 * sizeof(T)), aligned(alignof(T)), may_alias));
-      const Four a = *reinterpret_cast<const Four*>(at);
-      const Vector both = __builtin_shufflevector(a, a, 0, 1, 2, 3, 0, 1, 2, 3);
+      r.part[0] = (Vector)_mm512_maskz_broadcast_f32x4(0xffff, _mm_loadu_ps(at));
+      return r;
+    }
+    if constexpr (kLanes == 8) {
+      const Vector both = (Vector)_mm512_maskz_broadcast_f64x4(0xff, _mm256_loadu_pd(at));
       for (int p = 0; p < kParts; ++p) r.part[p] = both;
-    } else {
-      for (int p = 0; p < kParts; ++p) {
-        r.part[p] = *reinterpret_cast<const Unaligned*>(at + p * kLanes % 4);
-      }
+      return r;
+    }
+#elif defined(__AVX__)
+    if constexpr (kLanes == 8) {
+      const __m128 four = _mm_loadu_ps(at);
+      const Vector both = (Vector)_mm256_insertf128_ps(_mm256_castps128_ps256(four), four, 1);
+      for (int p = 0; p < kParts; ++p) r.part[p] = both;
+      return r;
+    }
+#endif
+    for (int p = 0; p < kParts; ++p) {
+      for (int l = 0; l < kLanes; ++l) r.part[p][l] = at[(p * kLanes + l) % 4];
     }
     return r;
   }
@@ -105,6 +113,14 @@ template <class T> UNIPHY_INLINE NodeRow<T> fma(const NodeRow<T>& a, const NodeR
 /// Sum over the three nodes: out[c] = Σ_k row[4k + c].
 template <class T>
 UNIPHY_INLINE void sum_nodes(const NodeRow<T>& row, T* out) {
+  if constexpr (NodeRow<T>::kLanes == 16) {
+    const auto all = row.part[0];
+    const auto sum = __builtin_shufflevector(all, all, 0, 1, 2, 3) +
+                     __builtin_shufflevector(all, all, 4, 5, 6, 7) +
+                     __builtin_shufflevector(all, all, 8, 9, 10, 11);
+    for (int c = 0; c < 4; ++c) out[c] = sum[c];
+    return;
+  }
   alignas(64) T buffer[NodeRow<T>::kParts * NodeRow<T>::kLanes];
   row.store(buffer);
   for (int c = 0; c < 4; ++c) out[c] = (buffer[c] + buffer[4 + c]) + buffer[8 + c];
