@@ -160,43 +160,6 @@ LawOutput apply(const SharedWeights& weights, const Tensor& F, const Tensor& C, 
   return {r[0], r[1]};
 }
 
-/// One linear layer that answers with `bias` whatever its input.
-kernels::MlpWeights constant_network(int in, const std::vector<double>& bias) {
-  kernels::MlpWeights::Layer layer;
-  layer.in = in;
-  layer.out = int(bias.size());
-  layer.weight.assign(std::size_t(layer.in) * layer.out, 0.0);
-  layer.bias = bias;
-  return {{layer}};
-}
-
-/// The same law with G(F) = F to the bit: caps out of reach (isotropic), no change (seed).
-SharedWeights without_projection(const LearnedLawWeights& weights) {
-  const auto shape = kernels::network_shape(weights.form);
-  auto r = std::make_shared<LearnedLawWeights>();
-  r->form = weights.form;
-  r->latent_size = weights.latent_size;
-  r->activation = weights.activation;
-  r->stress = weights.stress;
-  r->projection = constant_network(
-      shape.projection_in + weights.latent_size,
-      std::vector<double>(shape.projection_out,
-                          weights.form == kernels::LawForm::isotropic ? 1e30 : 0.0));
-  return r;
-}
-
-SharedWeights without_stress(const LearnedLawWeights& weights) {
-  const auto shape = kernels::network_shape(weights.form);
-  auto r = std::make_shared<LearnedLawWeights>();
-  r->form = weights.form;
-  r->latent_size = weights.latent_size;
-  r->activation = weights.activation;
-  r->projection = weights.projection;
-  r->stress = constant_network(shape.stress_in + weights.latent_size,
-                               std::vector<double>(shape.stress_out, 0.0));
-  return r;
-}
-
 }  // namespace
 
 LawOutput learned_law(const SharedWeights& weights, const Tensor& F_trial, const Tensor& C,
@@ -208,14 +171,14 @@ LawOutput learned_law(const SharedWeights& weights, const Tensor& F_trial, const
 
 Tensor learned_project(const SharedWeights& weights, const Tensor& F, const Tensor& z) {
   check_arguments(weights, "F", F, Tensor(), z);
-  return apply(without_stress(*weights), F, torch::zeros_like(F), z).F_proj;
+  return apply(kernels::without_stress(*weights), F, torch::zeros_like(F), z).F_proj;
 }
 
 Tensor learned_stress(const SharedWeights& weights, const Tensor& F_proj, const Tensor& C,
                       const Tensor& z) {
   check_arguments(weights, "F_proj", F_proj, C, z);
   if (!C.defined()) check("C", C, F_proj, true, 0);
-  return apply(without_projection(*weights), F_proj, C, z).tau;
+  return apply(kernels::without_projection(*weights), F_proj, C, z).tau;
 }
 
 }  // namespace uniphy::ops

@@ -82,4 +82,44 @@ void LearnedLawWeights::check() const {
   check_network("stress", stress, shape.stress_in + latent_size, shape.stress_out);
 }
 
+namespace {
+
+/// One linear layer that answers with `bias` whatever its input.
+MlpWeights constant_network(int in, const std::vector<double>& bias) {
+  MlpWeights::Layer layer;
+  layer.in = in;
+  layer.out = int(bias.size());
+  layer.weight.assign(std::size_t(layer.in) * layer.out, 0.0);
+  layer.bias = bias;
+  return {{layer}};
+}
+
+}  // namespace
+
+std::shared_ptr<const LearnedLawWeights> without_projection(const LearnedLawWeights& weights) {
+  const auto shape = network_shape(weights.form);
+  auto r = std::make_shared<LearnedLawWeights>();
+  r->form = weights.form;
+  r->latent_size = weights.latent_size;
+  r->activation = weights.activation;
+  r->stress = weights.stress;
+  r->projection = constant_network(
+      shape.projection_in + weights.latent_size,
+      std::vector<double>(shape.projection_out,
+                          weights.form == LawForm::isotropic ? 1e30 : 0.0));
+  return r;
+}
+
+std::shared_ptr<const LearnedLawWeights> without_stress(const LearnedLawWeights& weights) {
+  const auto shape = network_shape(weights.form);
+  auto r = std::make_shared<LearnedLawWeights>();
+  r->form = weights.form;
+  r->latent_size = weights.latent_size;
+  r->activation = weights.activation;
+  r->projection = weights.projection;
+  r->stress = constant_network(shape.stress_in + weights.latent_size,
+                               std::vector<double>(shape.stress_out, 0.0));
+  return r;
+}
+
 }  // namespace uniphy::kernels

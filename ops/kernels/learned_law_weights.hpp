@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -52,6 +53,11 @@ struct LearnedLawWeights {
   /// Throws Error naming the first layer whose shape does not fit.
   void check() const;
 };
+
+/// The same law with G(F) = F to the bit (caps out of reach, or no change), or without its stress
+/// network: the way to ask a law for its stress or its projection alone.
+std::shared_ptr<const LearnedLawWeights> without_projection(const LearnedLawWeights& weights);
+std::shared_ptr<const LearnedLawWeights> without_stress(const LearnedLawWeights& weights);
 
 // The units that the networks see; spec of the isotropic form. Coordinates 0 and 1 of z carry a
 // stress scale and a strain scale, so that one network serves soft and stiff materials alike.
