@@ -98,6 +98,6 @@ function(uniphy_add_isa_symbol_test target isa)
   if(TARGET ${target}_${isa} AND CMAKE_NM AND NOT UNIPHY_SANITIZE)
     add_test(NAME isa_symbols.${isa} COMMAND ${CMAKE_COMMAND}
              -DNM=${CMAKE_NM} -DISA=${isa} "-DOBJECTS=$<TARGET_OBJECTS:${target}_${isa}>"
-             -P "${PROJECT_SOURCE_DIR}/cmake/check_isa_symbols.cmake")
+             -P "${PROJECT_SOURCE_DIR}/.cmake/check_isa_symbols.cmake")
   endif()
 endfunction()

@@ -6,10 +6,10 @@ install(TARGETS ${uniphy_targets} EXPORT uniphyTargets ARCHIVE DESTINATION ${CMA
 install(DIRECTORY ops models uniphy DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/uniphy
         FILES_MATCHING PATTERN "*.hpp")
 install(EXPORT uniphyTargets NAMESPACE uniphy:: DESTINATION ${uniphy_package_dir})
-configure_package_config_file(cmake/uniphyConfig.cmake.in uniphyConfig.cmake
+configure_package_config_file(.cmake/uniphyConfig.cmake.in uniphyConfig.cmake
                               INSTALL_DESTINATION ${uniphy_package_dir})
 write_basic_package_version_file(uniphyConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES "${PROJECT_BINARY_DIR}/uniphyConfig.cmake"
               "${PROJECT_BINARY_DIR}/uniphyConfigVersion.cmake"
-              cmake/UniphyTorch.cmake cmake/UniphyPackages.cmake
+              .cmake/UniphyTorch.cmake .cmake/UniphyPackages.cmake
         DESTINATION ${uniphy_package_dir})
