@@ -1,0 +1,144 @@
+// What every law must satisfy, for learned ones; and the isotropic form with caps and coefficients
+// set by hand, where it is an analytic law.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+#include <random>
+
+#include "ops/kernels/law.hpp"
+#include "tests/support/law_cases.hpp"
+#include "tests/support/law_invariants.hpp"
+#include "tests/support/random_weights.hpp"
+
+namespace uniphy::testing {
+namespace {
+
+using kernels::Activation;
+using kernels::LawDescription;
+using kernels::LawForm;
+using kernels::LawId;
+using kernels::LearnedLawWeights;
+using kernels::MlpWeights;
+
+LawDescription described(LearnedLawWeights weights, std::vector<double> z) {
+  LawDescription d;
+  d.id = LawId::learned;
+  d.weights = std::make_shared<const LearnedLawWeights>(std::move(weights));
+  d.z = std::move(z);
+  return d;
+}
+
+/// One linear layer.
+MlpWeights linear(int in, std::vector<double> bias) {
+  MlpWeights::Layer layer;
+  layer.in = in;
+  layer.out = int(bias.size());
+  layer.weight.assign(std::size_t(in) * bias.size(), 0.0);
+  layer.bias = std::move(bias);
+  return {{layer}};
+}
+
+/// The isotropic form of the StVK-Hencky solid τ = 2μ ε + λ tr ε, with the caps (c₁, c₂) and
+/// c₁ + slope t/e.
+LearnedLawWeights hencky_solid(double mu, double lambda, double c1, double c2, double slope = 0) {
+  const double strain_over_stress = kernels::kStrainScale / kernels::kStressScale;
+  LearnedLawWeights w;
+  w.form = LawForm::isotropic;
+  w.latent_size = 2;  // z = 0: the scales are their constants
+  w.projection = linear(3 + 2, {c1, c2});
+  w.projection.layers[0].weight[0] = slope;
+  const double bulk = lambda + 2.0 / 3.0 * mu;
+  w.stress = linear(6 + 2, {bulk * strain_over_stress, 0, 2 * mu * strain_over_stress, 0, 0});
+  return w;
+}
+
+TEST(LearnedLawInvariants, OfRandomIsotropicLaws) {
+  for (const Activation activation : {Activation::gelu, Activation::silu, Activation::squareplus}) {
+    for (const unsigned seed : {1u, 2u, 3u}) {
+      SCOPED_TRACE(std::string(kernels::activation_name(activation)) + " " + std::to_string(seed));
+      const auto law = kernels::make_law<double>(
+          described(random_weights(LawForm::isotropic, 6, 24, 2, activation, seed),
+                    {0.5, 0.3, -0.2, 0.4, 0.1, -0.6}));
+      LawPromises promises;
+      promises.idempotent = promises.dissipative = false;  // nothing makes an untrained law so
+      promises.tolerance = 1e-11;
+      // Where c₁ ≤ 0 the law is a fluid at that state and forgets the rotation.
+      expect_rest(*law, 1e-4, promises);
+      expect_projection(*law, 1e-4, promises);
+      expect_finite(*law, 1e-4);
+      expect_independent_lanes(*law, 1e-4);
+      expect_frame_indifference(*law, 1e-4, promises);
+    }
+  }
+}
+
+TEST(LearnedLawInvariants, OfRandomSeedLaws) {
+  // The published form promises none of the physics, only sound numbers.
+  const auto law = kernels::make_law<double>(
+      described(random_weights(LawForm::seed, 6, 24, 2, Activation::gelu, 1),
+                {0.5, 0.3, -0.2, 0.4, 0.1, -0.6}));
+  expect_finite(*law, 1e-4);
+  expect_independent_lanes(*law, 1e-4);
+}
+
+TEST(LearnedLawInvariants, OfAnElasticLaw) {
+  const auto law = kernels::make_law<double>(described(hencky_solid(1e5, 2e5, 1e6, 1e6), {0, 0}));
+  LawPromises promises;
+  promises.elastic = true;
+  expect_law_invariants(*law, 1e-4, promises);
+}
+
+TEST(LearnedLawInvariants, OfAPlasticLaw) {
+  const auto law = kernels::make_law<double>(described(hencky_solid(1e5, 2e5, 0.7, 1e6), {0, 0}));
+  expect_law_invariants(*law, 1e-4, {});
+}
+
+struct Largest {
+  double projection = 0, stress = 0;
+};
+Largest difference(const kernels::LawKernel<double>& a, const kernels::LawKernel<double>& b) {
+  Largest largest;
+  std::mt19937_64 random(3);
+  for (const Matrix& F : sound_deformations(400)) {
+    const Matrix C = random_matrix(random, 10);
+    const LawState x = apply_law(a, 1e-4, F, C), y = apply_law(b, 1e-4, F, C);
+    largest.projection = std::max(largest.projection, norm(x.F_proj - y.F_proj) / norm(y.F_proj));
+    largest.stress = std::max(largest.stress, norm(x.tau - y.tau) / std::max(norm(y.tau), 1e3));
+  }
+  return largest;
+}
+
+TEST(LearnedLaw, WithAConstantCapIsPlasticine) {
+  const double mu = 1e5, lambda = 2e5, tau_y = 7e3;
+  const auto learned = kernels::make_law<double>(
+      described(hencky_solid(mu, lambda, tau_y / (2 * mu) / kernels::kStrainScale, 1e6), {0, 0}));
+  LawDescription d;
+  d.id = LawId::plasticine;
+  d.mu = mu;
+  d.lambda = lambda;
+  d.tau_y = tau_y;
+  const Largest largest = difference(*learned, *kernels::make_law<double>(d));
+  EXPECT_LE(largest.projection, 1e-13);
+  EXPECT_LE(largest.stress, 1e-11);
+}
+
+TEST(LearnedLaw, WithACapLinearInTheTraceIsSand) {
+  const double mu = 1e5, lambda = 2e5, theta = 0.35;
+  const double alpha = std::sqrt(2.0 / 3) * 2 * std::sin(theta) / (3 - std::sin(theta));
+  const double slope = -alpha * (3 * lambda + 2 * mu) / (2 * mu);
+  const auto learned =
+      kernels::make_law<double>(described(hencky_solid(mu, lambda, 0, 0, slope), {0, 0}));
+  LawDescription d;
+  d.id = LawId::sand;
+  d.mu = mu;
+  d.lambda = lambda;
+  d.theta = theta;
+  const Largest largest = difference(*learned, *kernels::make_law<double>(d));
+  EXPECT_LE(largest.projection, 1e-13);
+  EXPECT_LE(largest.stress, 1e-11);
+}
+
+}  // namespace
+}  // namespace uniphy::testing
