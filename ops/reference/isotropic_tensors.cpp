@@ -76,7 +76,28 @@ class PolarFunction : public torch::autograd::Function<PolarFunction> {
   }
 };
 
+class SymmetricExpFunction : public torch::autograd::Function<SymmetricExpFunction> {
+ public:
+  static Tensor forward(AutogradContext* ctx, const Tensor& M) {
+    const auto [value, Q] = torch::linalg_eigh(M);
+    ctx->save_for_backward({value, Q});
+    return (Q * columns(value.exp())).matmul(Q.mT());
+  }
+
+  static variable_list backward(AutogradContext* ctx, variable_list grad) {
+    if (!grad[0].defined()) return {Tensor()};
+    const auto saved = ctx->get_saved_variables();
+    const Tensor value = saved[0], Q = saved[1];
+    const Tensor gap = rows(value) - columns(value), one = torch::ones_like(gap);
+    const Tensor safe = torch::where(gap == 0, one, gap);
+    const Tensor divided = columns(value.exp()) * torch::where(gap == 0, one, gap.expm1() / safe);
+    return {Q.matmul(Q.mT().matmul(grad[0]).matmul(Q) * divided).matmul(Q.mT())};
+  }
+};
+
 }  // namespace
+
+Tensor symmetric_exp(const Tensor& M) { return SymmetricExpFunction::apply(M); }
 
 Tensor hencky_tensor(const Tensor& F) { return HenckyFunction::apply(F); }
 

@@ -17,4 +17,7 @@ torch::Tensor hencky_tensor(const torch::Tensor& F);
 /// to F). (Uᵀ dR V)_ij = (B_ij − B_ji)/(σ_i + σ_j), the sum bounded away from 0 by 1e-5.
 torch::Tensor polar_rotation(const torch::Tensor& F, const SignedSvd& factors);
 
+/// exp M of a symmetric M [P, 3, 3]. (torch::matrix_exp is only good to 1e-9 in float64.)
+torch::Tensor symmetric_exp(const torch::Tensor& M);
+
 }  // namespace uniphy::ops::reference

@@ -70,13 +70,12 @@ Tensor isotropic_project(const LearnedLawTensors& law, const Tensor& F, const Te
                           : double(std::numeric_limits<float>::min());
   const Tensor deviates = norm2 > tiny;
   const Tensor norm = torch::where(deviates, norm2, one).sqrt();
-  const Tensor over = deviates & (norm > cap_q), over_t = t > cap_t;
-  // Without a deviator there is nothing to scale, but its derivative is: the limit from above.
-  const Tensor scale =
-      torch::where(over, cap_q / norm, torch::where(deviates | (c1 > 0), one, one * 0));
+  // c₁ ≤ 0 yields even at ‖ε̂‖ = 0, where only the derivative can tell.
+  const Tensor over = (deviates & (norm > cap_q)) | (c1 <= 0), over_t = t > cap_t;
+  const Tensor scale = torch::where(over, cap_q / norm * deviates, one);
   const Tensor trace_proj = torch::where(over_t, cap_t, t);
   const Tensor M = at_matrix(scale) * H_dev + at_matrix(trace_proj / 3) * identity(F);
-  const Tensor yielded = torch::matrix_exp(M).matmul(polar_rotation(F, signed_svd(F.detach())));
+  const Tensor yielded = symmetric_exp(M).matmul(polar_rotation(F, signed_svd(F.detach())));
   return torch::where(at_matrix(over | over_t), yielded, F);
 }
 

@@ -104,20 +104,21 @@ class SignedSvdFunction : public torch::autograd::Function<SignedSvdFunction> {
     const auto saved = ctx->get_saved_variables();
     const Tensor U = saved[0], sigma = saved[1], V = saved[2];
     const bool wide = U.scalar_type() == torch::kFloat64;
-    const Tensor square = sigma * sigma;
-    const Tensor d = square.unsqueeze(1) - square.unsqueeze(2);  // σj² − σi²
-    const double tiny = wide ? 1e8 * std::numeric_limits<double>::min()
-                             : 1e8 * double(std::numeric_limits<float>::min());
-    const Tensor floor = (wide ? 1e-4 : 1e-3) * square.slice(1, 0, 1).clamp_min(tiny).unsqueeze(2);
-    const Tensor inverse = d / (d * d + floor * floor);
+    // In units of the largest singular value.
+    const Tensor top = sigma.slice(1, 0, 1).clamp_min(1e-4);
+    const Tensor square = (sigma / top).square();
+    const Tensor d = square.unsqueeze(1) - square.unsqueeze(2);  // (σj² − σi²)/σ²
+    const double epsilon = wide ? 1e-6 : 1e-3;
+    const Tensor inverse = d / (d * d + epsilon * epsilon) / top.unsqueeze(2);  // times σ
+    const Tensor scaled = sigma / top;
     Tensor A = torch::zeros_like(U);
     if (grad[0].defined()) {
       const Tensor P = U.mT().matmul(grad[0]);
-      A = A + (P - P.mT()) * inverse * sigma.unsqueeze(1);
+      A = A + (P - P.mT()) * inverse * scaled.unsqueeze(1);
     }
     if (grad[2].defined()) {
       const Tensor Q = V.mT().matmul(grad[2]);
-      A = A + sigma.unsqueeze(2) * ((Q - Q.mT()) * inverse);
+      A = A + scaled.unsqueeze(2) * ((Q - Q.mT()) * inverse);
     }
     if (grad[1].defined()) A = A + torch::diag_embed(grad[1]);
     return {U.matmul(A).matmul(V.mT())};

@@ -17,7 +17,7 @@ struct SignedSvd {
 /// open, and not only up to them (LAPACK's do not).
 ///
 /// Differentiable: the exact derivative of U and V holds 1/(σj² − σi²); here it is d/(d² + ε²σ⁴),
-/// d = σj² − σi², ε = 1e-4 (float64) or 1e-3 (float32) and σ the largest singular value: never NaN,
+/// d = σj² − σi², ε = 1e-6 (float64) or 1e-3 (float32) and σ the largest singular value: never NaN,
 /// exact away from equal values. Isotropic functions of F have exact gradients that do not need it:
 /// isotropic_tensors.hpp.
 SignedSvd signed_svd(const torch::Tensor& F);
