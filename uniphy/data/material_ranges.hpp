@@ -25,7 +25,6 @@ const std::vector<MaterialRanges>& default_material_ranges();
 
 /// One point of the unit cube of parameters for each of `count` trajectories, such that every
 /// parameter has exactly one of them in each of `count` equal parts of [0, 1): a Latin hypercube.
-/// `within` [count] places the points inside their parts, see below.
 /// M. McKay, R. Beckman, W. Conover, Technometrics 21 (1979).
 class LatinHypercube {
  public:

@@ -166,6 +166,7 @@ TrajectorySetup draw_setup(const GenerateOptions& o, std::int64_t trajectory,
   setup.record.dt = dt;
   setup.record.density = o.density;
   setup.record.seed = static_cast<std::int64_t>(o.seed);
+  setup.record.attempt = attempt;
   setup.scene.bodies.push_back(std::move(body));
   return setup;
 }

@@ -70,7 +70,7 @@ void DatasetWriter::finish() {
   const auto count = static_cast<std::int64_t>(records_.size());
   std::vector<std::string> material, shape;
   std::vector<double> parameters, dt, density;
-  std::vector<std::int64_t> seed;
+  std::vector<std::int64_t> seed, attempt;
   for (const TrajectoryRecord& record : records_) {
     material.push_back(record.material);
     shape.push_back(record.shape);
@@ -78,6 +78,7 @@ void DatasetWriter::finish() {
     dt.push_back(record.dt);
     density.push_back(record.density);
     seed.push_back(record.seed);
+    attempt.push_back(record.attempt);
   }
   writer_.write_strings("trajectories/material", material, {"1", "name of the law"});
   writer_.write(
@@ -86,6 +87,8 @@ void DatasetWriter::finish() {
   writer_.write("trajectories/dt", dt, {count}, {"s", "time step"});
   writer_.write("trajectories/density", density, {count}, {"kg/m^3", "density"});
   writer_.write("trajectories/seed", seed, {count}, {"1", "seed that drew the trajectory"});
+  writer_.write("trajectories/attempt", attempt, {count},
+                {"1", "which draw of the trajectory it is, counted from 0"});
   writer_.write_strings("trajectories/shape", shape, {"1", "name of the shape"});
   writer_.commit();
 }
@@ -104,6 +107,9 @@ Dataset read_dataset(const std::filesystem::path& file) {
   const auto dt = reader.read<double>("trajectories/dt", {count}, hdf5::Values::finite);
   const auto density = reader.read<double>("trajectories/density", {count}, hdf5::Values::finite);
   const auto seed = reader.read<std::int64_t>("trajectories/seed", {count});
+  const auto attempt = reader.has("trajectories/attempt")
+                           ? reader.read<std::int64_t>("trajectories/attempt", {count})
+                           : std::vector<std::int64_t>(static_cast<std::size_t>(count), 0);
   const auto shape = reader.read_strings("trajectories/shape", count);
   for (std::size_t i = 0; i < material.size(); ++i) {
     TrajectoryRecord record;
@@ -114,6 +120,7 @@ Dataset read_dataset(const std::filesystem::path& file) {
     record.dt = dt[i];
     record.density = density[i];
     record.seed = seed[i];
+    record.attempt = attempt[i];
     record.shape = shape[i];
     if (!(record.dt > 0)) {
       reader.fail("/trajectories/dt", fmt::format("expected time steps > 0 s, found {}", dt[i]));

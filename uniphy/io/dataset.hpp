@@ -14,6 +14,8 @@
 //   /trajectories/parameters [N, 5]  mu (Pa), lambda (Pa), tau_y (Pa), theta (rad), eta (Pa s);
 //                                    NaN where the law has none
 //   /trajectories/dt [N] s, density [N] kg/m^3, seed [N], shape [N]
+//   /trajectories/attempt [N]        which draw of the trajectory it is, counted from 0 (a run that
+//                                    failed was replaced); a file without it holds first draws
 
 #include <array>
 #include <cmath>
@@ -44,6 +46,7 @@ struct TrajectoryRecord {
   double dt = 0;       ///< s
   double density = 0;  ///< kg/m^3
   std::int64_t seed = 0;
+  std::int64_t attempt = 0;
   std::string shape;
 };
 

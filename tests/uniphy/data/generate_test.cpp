@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "tests/uniphy/support/scratch.hpp"
+#include "uniphy/data/dataset_setup.hpp"
 #include "uniphy/data/law_branches.hpp"
 #include "uniphy/data/part_file.hpp"
 #include "uniphy/data/trajectory_setup.hpp"
@@ -144,15 +145,30 @@ TEST(Generate, RunsThatFailAreReplacedAndCounted) {
   EXPECT_THAT(report, HasSubstr("left out: trajectory"));
   EXPECT_THAT(report, HasSubstr("elastic, mu "));
   // The parameters are those of the attempt that ended well.
-  for (const TrajectoryRecord& record : data.trajectories) {
-    bool found = false;
-    for (std::int64_t i = 0; i < 6; ++i) {
-      for (std::int64_t attempt = 0; attempt < 100; ++attempt) {
-        found = found || draw_setup(options, i, attempt).law().mu == record.parameters[0];
-      }
-    }
-    EXPECT_TRUE(found);
+  std::int64_t attempts = 0;
+  for (std::int64_t i = 0; i < 6; ++i) {
+    const TrajectoryRecord& record = data.trajectories[static_cast<std::size_t>(i)];
+    EXPECT_EQ(draw_setup(options, i, record.attempt).law().mu, record.parameters[0]);
+    attempts += record.attempt;
   }
+  EXPECT_EQ(attempts, *metrics.find("failed.elastic"));
+}
+
+TEST(Generate, TheFileLeadsBackToItsScenes) {
+  testing::Scratch scratch;
+  const GenerateOptions options = options_of(kSmall);
+  Metrics metrics;
+  generate(options, scratch.file("d.h5"), 2, metrics);
+  Dataset data = read_dataset(scratch.file("d.h5"));
+  for (std::int64_t i = 0; i < options.total(); ++i) {
+    const TrajectorySetup setup = setup_of(data, i);
+    EXPECT_EQ(place_scene(setup.scene).x, place_scene(draw_setup(options, i, 0).scene).x);
+  }
+  EXPECT_THAT(testing::error_of([&] { setup_of(data, 10); }), HasSubstr("trajectory 10"));
+  data.trajectories[3].parameters[0] *= 1.001;
+  EXPECT_THAT(testing::error_of([&] { setup_of(data, 3); }), HasSubstr("other parameters"));
+  data.config = "scene: {}\n";
+  EXPECT_THAT(testing::error_of([&] { setup_of(data, 0); }), HasSubstr("config of the data set"));
 }
 
 TEST(Generate, GivesUpAfterTheAttempts) {
