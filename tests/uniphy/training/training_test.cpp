@@ -1,0 +1,215 @@
+// Algorithm 1 on small data sets of the analytic laws.
+
+#include <ATen/Parallel.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <random>
+
+#include "ops/kernels/error.hpp"
+#include "ops/kernels/law.hpp"
+#include "uniphy/training/law_error.hpp"
+#include "uniphy/training/trainer.hpp"
+
+namespace uniphy {
+namespace {
+
+using torch::Tensor;
+
+/// `count` random states of each law, through the law itself.
+Dataset small_data(int count, unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal;
+  Dataset data;
+  data.first = {0};
+  const auto add = [&](kernels::LawDescription law) {
+    TrajectoryRecord record;
+    record.material = kernels::law_name(law.id);
+    record.dt = 1e-4;
+    record.density = 1000;
+    data.trajectories.push_back(record);
+    const std::size_t at = data.samples.F.size();
+    for (int s = 0; s < count; ++s) {
+      const double size = std::pow(10.0, -3 + 2 * double(s) / count);
+      for (int k = 0; k < 9; ++k) {
+        data.samples.F.push_back((k % 4 == 0) + size * normal(random));
+        data.samples.C.push_back(5 * normal(random));
+      }
+      data.trajectory.push_back(std::int32_t(data.trajectories.size()) - 1);
+    }
+    data.samples.F_proj.resize(data.samples.F.size());
+    data.samples.tau.resize(data.samples.F.size());
+    const auto kernel = kernels::make_law<double>(law);
+    kernel->evaluate(count, 1e-4, {data.samples.F.data() + at, 9, 1},
+                     {data.samples.C.data() + at, 9, 1}, {data.samples.F_proj.data() + at, 9, 1},
+                     {data.samples.tau.data() + at, 9, 1});
+    data.first.push_back(data.samples.size());
+  };
+  kernels::LawDescription law;
+  law.mu = 1e5;
+  law.lambda = 2e5;
+  add(law);
+  law.id = kernels::LawId::plasticine;
+  law.tau_y = 5e3;
+  add(law);
+  law.id = kernels::LawId::sand;
+  law.theta = 0.3;
+  add(law);
+  law.id = kernels::LawId::newtonian;
+  law.mu = 300;
+  add(law);
+  return data;
+}
+
+TrainingOptions small_options(kernels::LawForm form = kernels::LawForm::isotropic) {
+  TrainingOptions o;
+  o.network.form = form;
+  o.network.latent_size = 4;
+  o.network.hidden_layers = 2;
+  o.network.width = 16;
+  o.steps = 60;
+  o.batch_per_trajectory = 32;
+  o.checkpoint_every = 25;
+  return o;
+}
+
+class TrainingTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
+    directory_ = std::filesystem::temp_directory_path() /
+                 (std::string("uniphy_training_") + test->name());
+    std::filesystem::remove_all(directory_);
+    std::filesystem::create_directories(directory_);
+  }
+  void TearDown() override { std::filesystem::remove_all(directory_); }
+  std::filesystem::path directory_;
+};
+
+bool same(const TrainingResult& a, const TrainingResult& b) {
+  const auto pa = a.networks.parameters(), pb = b.networks.parameters();
+  for (std::size_t k = 0; k < pa.size(); ++k)
+    if (!torch::equal(pa[k], pb[k])) return false;
+  return torch::equal(a.z, b.z);
+}
+
+/// The loss that is trained must be the law that is simulated: the objective's squared errors, made
+/// absolute again, against the kernels' own answers.
+TEST_F(TrainingTest, ObjectiveIsTheKernelsError) {
+  const Dataset data = small_data(40, 3);
+  for (const kernels::LawForm form : {kernels::LawForm::isotropic, kernels::LawForm::seed}) {
+    torch::Generator generator = torch::make_generator<at::CPUGeneratorImpl>(5);
+    NetworkOptions options = small_options(form).network;
+    const Networks networks = Networks::random(options, generator);
+    const Tensor z = torch::randn({4, 4}, generator, torch::kFloat32) * 0.3;
+    const Objective objective(law_columns(data, form), form, 1e-6);
+    const Tensor rows = torch::arange(160).view({4, 40});
+    const LawErrors errors = objective.errors(networks, z, rows, torch::arange(4));
+    const auto weights = std::make_shared<kernels::LearnedLawWeights>(networks.weights());
+    const auto stress_only = kernels::without_projection(*weights);
+    for (int i = 0; i < 4; ++i) {
+      kernels::LawDescription law;
+      law.id = kernels::LawId::learned;
+      law.weights = stress_only;
+      for (int k = 0; k < 4; ++k) law.z.push_back(z[i][k].item<double>());
+      std::vector<double> F(360), tau(360);
+      const double* F_proj = data.samples.F_proj.data() + 9 * data.first[i];
+      const double* truth = data.samples.tau.data() + 9 * data.first[i];
+      kernels::make_law<double>(law)->evaluate(
+          40, 1e-4, {F_proj, 9, 1}, {data.samples.C.data() + 9 * data.first[i], 9, 1},
+          {F.data(), 9, 1}, {tau.data(), 9, 1});
+      for (int s = 0; s < 40; ++s) {
+        double difference = 0, size = 0;
+        for (int k = 0; k < 9; ++k) {
+          const double t = truth[9 * s + k];
+          difference += (tau[9 * s + k] - t) * (tau[9 * s + k] - t);
+          size += t * t;
+        }
+        if (size < 1e-3) continue;  // float32 columns hold no relative error of nothing
+        const double expected = difference / size;
+        EXPECT_NEAR(errors.stress[i][s].item<double>(), expected, 2e-3 * expected + 1e-5)
+            << kernels::form_name(form) << " trajectory " << i << " sample " << s;
+      }
+    }
+  }
+}
+
+TEST_F(TrainingTest, LearnsBothForms) {
+  const Dataset data = small_data(200, 1);
+  for (const kernels::LawForm form : {kernels::LawForm::isotropic, kernels::LawForm::seed}) {
+    TrainingOptions o = small_options(form);
+    o.steps = 400;
+    o.learning_rate = 1e-2;
+    const TrainingResult result =
+        train(data, o, directory_ / (std::string(kernels::form_name(form)) + ".pt"));
+    EXPECT_LT(result.history.back().loss, 0.6 * result.history.front().loss);
+    EXPECT_LT(result.history.back().stress_error, 0.3);
+  }
+}
+
+TEST_F(TrainingTest, ResumesToTheSameBitsOnAnyNumberOfThreads) {
+  const Dataset data = small_data(50, 2);
+  const TrainingOptions o = small_options();
+  const int threads = at::get_num_threads();
+  at::set_num_threads(1);
+  const TrainingResult whole = train(data, o, directory_ / "whole.pt");
+  at::set_num_threads(2);
+  EXPECT_TRUE(same(whole, train(data, o, directory_ / "two.pt")));
+  // whole.pt is the state after step 50 of 60: a second call goes on from it.
+  const TrainingResult resumed = train(data, o, directory_ / "whole.pt");
+  at::set_num_threads(threads);
+  EXPECT_TRUE(same(whole, resumed));
+  ASSERT_EQ(whole.history.size(), resumed.history.size());
+  EXPECT_EQ(whole.history.back().loss, resumed.history.back().loss);
+}
+
+TEST_F(TrainingTest, RefusesForeignAndDamagedCheckpoints) {
+  const Dataset data = small_data(20, 2);
+  TrainingOptions o = small_options();
+  const auto file = directory_ / "checkpoint.pt";
+  const auto message = [&](const Dataset& d) -> std::string {
+    try {
+      train(d, o, file);
+    } catch (const Error& e) {
+      return e.what();
+    }
+    return "";
+  };
+  train(data, o, file);
+  EXPECT_THAT(message(small_data(20, 9)), ::testing::HasSubstr("belongs to another run"));
+  o.network.width = 20;
+  EXPECT_THAT(message(data), ::testing::AllOf(::testing::HasSubstr("width 20"),
+                                              ::testing::HasSubstr("width 16")));
+  o.network.width = 16;
+  std::filesystem::resize_file(file, std::filesystem::file_size(file) / 2);
+  EXPECT_THAT(message(data), ::testing::HasSubstr("expected a training checkpoint"));
+  std::ofstream(file) << "not an archive";
+  EXPECT_THAT(message(data), ::testing::HasSubstr("expected a training checkpoint"));
+}
+
+TEST_F(TrainingTest, FindsTheCodeOfKnownSamples) {
+  const Dataset data = small_data(200, 1);
+  TrainingOptions o = small_options();
+  o.steps = 300;
+  o.learning_rate = 1e-2;
+  const TrainingResult result = train(data, o, directory_ / "c.pt");
+  LatentFitOptions fit;
+  fit.steps = 100;
+  fit.starts = 2;
+  const Tensor z = fit_latents(data, result.networks, result.z, fit);
+  const auto weights = std::make_shared<kernels::LearnedLawWeights>(result.networks.weights());
+  const auto errors_of = [&](const Tensor& codes) {
+    const Tensor flat = codes.detach().to(torch::kFloat64).contiguous();
+    return law_errors(data, weights,
+                      {flat.data_ptr<double>(), flat.data_ptr<double>() + flat.numel()});
+  };
+  const auto trained = errors_of(result.z), fitted = errors_of(z);
+  for (std::size_t i = 0; i < trained.size(); ++i)
+    EXPECT_LE(fitted[i].stress, 2 * trained[i].stress + 0.02) << data.trajectories[i].material;
+}
+
+}  // namespace
+}  // namespace uniphy
