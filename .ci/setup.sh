@@ -8,6 +8,7 @@ packages=(
   libhdf5-dev libyaml-cpp-dev nlohmann-json3-dev libtinyobjloader-dev
   libcli11-dev libspdlog-dev libfmt-dev
   libgtest-dev libgmock-dev libbenchmark-dev
+  gnuplot-nox  # the charts and pictures of the reports
 )
 
 if ! command -v apt-get >/dev/null || ! command -v dpkg-query >/dev/null; then
@@ -21,6 +22,10 @@ for prefix in ${Torch_DIR:+"$Torch_DIR"} $(tr ':;' '  ' <<<"${CMAKE_PREFIX_PATH:
     packages=("${packages[@]/libtorch-dev/}")
   fi
 done
+# gnuplot with windows (gnuplot-qt, gnuplot-x11) will do as well.
+if command -v gnuplot >/dev/null; then
+  packages=("${packages[@]/gnuplot-nox/}")
+fi
 
 missing=()
 for package in ${packages[@]}; do
