@@ -1,0 +1,152 @@
+// The plastic laws at their yield surfaces and in their limits.
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "tests/support/law_gradients.hpp"
+#include "tests/support/law_invariants.hpp"
+
+namespace uniphy::testing {
+namespace {
+
+using kernels::Isa;
+using kernels::LawDescription;
+using kernels::LawId;
+
+class Plastic : public ::testing::TestWithParam<LawId> {};
+INSTANTIATE_TEST_SUITE_P(All, Plastic,
+                         ::testing::Values(LawId::plasticine, LawId::sand, LawId::non_newtonian),
+                         [](const auto& info) {
+                           return std::string(kernels::law_name(info.param));
+                         });
+
+TEST_P(Plastic, KeepsTheBitsOfFInsideAndProjectsOntoTheSurfaceOutside) {
+  const LawDescription d = sample_law(GetParam());
+  const auto law = kernels::make_analytic_law<double>(d);
+  std::mt19937_64 random(23);
+  for (int i = 0; i < 100; ++i) {
+    const double t = -0.05, k = yield_norm(d, t);
+    const Matrix inside = strained(0.9 * k, t, random), outside = strained(2 * k, t, random);
+    EXPECT_EQ(apply_law(*law, 1e-4, inside).F_proj, inside);
+    const Matrix projected = apply_law(*law, 1e-4, outside).F_proj;
+    EXPECT_GT(norm(projected - outside), 1e-3);
+    const Eigen::Matrix3d e = hencky_tensor(projected);
+    const double q = (e - e.trace() / 3 * Eigen::Matrix3d::Identity()).norm();
+    EXPECT_NEAR(e.trace(), t, 1e-13);
+    if (GetParam() == LawId::non_newtonian) {
+      EXPECT_GT(q, 1.001 * k);
+      EXPECT_LT(q, 2 * k);
+    } else {
+      EXPECT_NEAR(q, k, 1e-13);
+    }
+  }
+}
+
+// Just off the surface, on either side, the gradient is that of its own side.
+TEST_P(Plastic, GradientsHoldOnBothSidesOfTheSurface) {
+  const LawDescription d = sample_law(GetParam());
+  std::mt19937_64 random(27);
+  for (const double off : {-1e-2, -3e-3, 3e-3, 1e-2}) {
+    for (int i = 0; i < 20; ++i) {
+      const double t = -0.05;
+      const Matrix F = strained(yield_norm(d, t) * (1 + off), t, random);
+      for (const Stage stage : {Stage::project, Stage::fused}) {
+        const LawGradientCheck check = make_check(GetParam(), stage, kernels::active_isa(), random);
+        const auto e = check.errors(F, Matrix{}, parameter_array(d), 2e-6);
+        EXPECT_LE(e.worst(), 1e-6) << stage_name(stage) << " at " << off;
+      }
+    }
+  }
+}
+
+// In a band of rounding width round the surface a particle may take either branch, but it must take
+// one of the two: the gradient is close to that of one side, and outside the band of the right one.
+TEST_P(Plastic, FlipsAreConfinedToTheBand) {
+  const LawDescription d = sample_law(GetParam());
+  const auto& entry = kernels::law_table<double>().laws[static_cast<int>(GetParam())];
+  const auto parameters = to_parameters(parameter_array(d));
+  std::mt19937_64 random(33);
+  int flips = 0;
+  const int count = 400;
+  for (int i = 0; i < count; ++i) {
+    const double t = -0.05, k = yield_norm(d, t);
+    const double off = (i % 2 ? 1 : -1) * std::pow(10.0, -15 + 5.0 * i / count);
+    const Matrix F = strained(k * (1 + off), t, random);
+    Matrix projected;
+    entry.project(1, parameters, 1e-4, {F.data(), 9, 1}, {projected.data(), 9, 1});
+    const bool yielded = projected != F;
+    if (yielded != (off > 0)) {
+      ++flips;
+      EXPECT_LT(std::abs(off), 1e-13);
+    }
+    EXPECT_LE(norm(projected - F), 2 * k * std::abs(off) + 1e-14);
+    const Matrix W = random_matrix(random);
+    Matrix grad;
+    entry.project_adjoint(1, parameters, 1e-4, {F.data(), 9, 1}, {W.data(), 9, 1},
+                          {grad.data(), 9, 1}, nullptr);
+    EXPECT_EQ(grad == W, !yielded);
+  }
+  EXPECT_LE(flips, count / 4);
+}
+
+// The tip of the cone: in tension sand becomes its rotation, and the stress is gone.
+TEST(DruckerPrager, TensionLeavesARotation) {
+  const LawDescription d = sample_law(LawId::sand);
+  const auto law = kernels::make_analytic_law<double>(d);
+  std::mt19937_64 random(35);
+  for (int i = 0; i < 50; ++i) {
+    const LawState state = apply_law(*law, 1e-4, strained(0.1, 0.05, random));
+    EXPECT_LE(norm(multiply(state.F_proj, transposed(state.F_proj)) - identity()), 1e-14);
+    EXPECT_NEAR(det(state.F_proj), 1, 1e-14);
+    EXPECT_LE(norm(state.tau), 1e-9);
+  }
+}
+
+TEST(Viscoplastic, IsPlasticineAtZeroViscosity) {
+  LawDescription fluid = sample_law(LawId::non_newtonian), solid = sample_law(LawId::plasticine);
+  fluid.eta = 0;
+  for (const Isa isa : kernels::available_isas()) {
+    const auto a = kernels::make_analytic_law<double>(fluid, isa);
+    const auto b = kernels::make_analytic_law<double>(solid, isa);
+    for (const Matrix& F : sound_deformations()) {
+      const LawState x = apply_law(*a, 1e-4, F), y = apply_law(*b, 1e-4, F);
+      EXPECT_LE(norm(x.F_proj - y.F_proj), 1e-15 * norm(F));
+      EXPECT_LE(norm(x.tau - y.tau), 1e-15 * fluid.lambda);
+    }
+  }
+}
+
+TEST(Viscoplastic, IsTheIdentityAtInfiniteViscosityOrZeroTime) {
+  LawDescription d = sample_law(LawId::non_newtonian);
+  for (const auto& [eta, dt] : {std::pair<double, double>{1e25, 1e-4}, {5, 0}, {5, 1e-30}}) {
+    d.eta = eta;
+    const auto law = kernels::make_analytic_law<double>(d);
+    for (const Matrix& F : sound_deformations())
+      EXPECT_LE(norm(apply_law(*law, dt, F).F_proj - F), 1e-14 * norm(F));
+  }
+}
+
+// A clamp at 0.05 sits inside the logarithm: values continue, derivatives of what is below vanish.
+TEST(Hencky, StretchesAreClampedBeforeTheLogarithm) {
+  const LawDescription d = sample_law(LawId::plasticine);
+  const auto& entry = kernels::law_table<double>().laws[static_cast<int>(d.id)];
+  const auto parameters = to_parameters(parameter_array(d));
+  const auto stress = [&](double s) {
+    Matrix tau;
+    const Matrix F = diagonal(1.1, 0.9, s);
+    entry.stress(1, parameters, {F.data(), 9, 1}, {}, {tau.data(), 9, 1});
+    return tau;
+  };
+  const double e[3] = {std::log(1.1), std::log(0.9), std::log(0.05)};
+  const double trace = e[0] + e[1] + e[2];
+  for (const double s : {0.05, 0.01, 0.0, -0.3}) {
+    for (int i = 0; i < 3; ++i)
+      EXPECT_NEAR(stress(s)[4 * i], 2 * d.mu * e[i] + d.lambda * trace, 1e-8) << s;
+  }
+  EXPECT_NEAR(stress(0.06)[8],
+              2 * d.mu * std::log(0.06) + d.lambda * (e[0] + e[1] + std::log(0.06)), 1e-8);
+}
+
+}  // namespace
+}  // namespace uniphy::testing
