@@ -20,6 +20,14 @@ std::vector<ParticleRange> ranges_of(const Rollout<T>& rollout) {
   return ranges;
 }
 
+/// Chunks are longer than the hardware prefetchers look ahead, and their planes are no stream to
+/// them: without this, 1e5 particles cost a fifth more.
+void prefetch(const void* from, std::size_t bytes) {
+  for (std::size_t i = 0; i < bytes; i += 64) {
+    __builtin_prefetch(static_cast<const char*>(from) + i, 1, 2);
+  }
+}
+
 }  // namespace
 
 template <class T>
@@ -108,6 +116,10 @@ void RolloutEngine<T>::transfer_layers(std::ptrdiff_t s, int part, int parts) {
 template <class T>
 void RolloutEngine<T>::end_step(int chunk, std::ptrdiff_t s) {
   alignas(64) T moments[kGatherPlanes * kChunk];
+  if (chunk + 1 < chunks()) {
+    prefetch(state(s, chunk + 1), kStateChunkSize * sizeof(T));
+    prefetch(&transfer_[chunk + 1], sizeof(TransferChunk<T>));
+  }
   TransferChunk<T>& transfer = transfer_[chunk];
   const T* from = state(s, chunk);
   T* to = state(s + 1, chunk);
