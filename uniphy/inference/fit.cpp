@@ -116,7 +116,8 @@ class Fit {
     double best = kInfinity;
     for (const FitCandidate& c : state_.candidates) best = std::min(best, c.mse);
     if (state_.stage < 0) return "starts";
-    return fmt::format("stage {} of {}, mse {:.2e} m^2", state_.stage + 1, stages(), best);
+    return fmt::format("stage {} of {}, mse {:.2e} m^2", std::min(state_.stage + 1, stages()),
+                       stages(), best);
   }
 
   void rank() {

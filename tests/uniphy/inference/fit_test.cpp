@@ -1,0 +1,222 @@
+#include "uniphy/inference/fit.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <omp.h>
+
+#include <cmath>
+
+#include "tests/uniphy/inference/observed_scene.hpp"
+#include "tests/uniphy/support/scratch.hpp"
+#include "uniphy/inference/infer_run.hpp"
+
+namespace uniphy {
+namespace {
+
+using ::testing::HasSubstr;
+
+FitHooks quiet() {
+  FitHooks hooks;
+  hooks.progress = false;
+  return hooks;
+}
+
+FitOptions schedule(const std::string& dtype = "float32", const std::string& method = "bfgs") {
+  FitOptions options;
+  options.dtype = dtype;
+  options.stages = {{0.3, 4, 5, method, 0.1}, {0.6, 2, 6, method, 0.1}, {1, 1, 20, method, 0.1}};
+  return options;
+}
+
+/// A code between the training codes, and what it does.
+struct Hidden {
+  ModelFile model = testing::readable_model();
+  std::unique_ptr<const Unknowns> unknowns = make_latent_unknowns(model);
+  kernels::LawDescription law;
+  Observation observation;
+
+  Hidden() {
+    law = unknowns->law(unknowns->start(3));
+    law.z[0] += 0.1;
+    law.z[2] -= 0.15;
+    law.z[3] += 0.3;
+    observation = testing::observe(law);
+  }
+};
+
+TEST(Fit, FindsTheParametersOfAnElasticBody) {
+  const Observation o = testing::observe(testing::elastic_body(2e4, 3e4));
+  const auto unknowns =
+      make_analytic_unknowns(kernels::LawId::elastic, {{1e3, 1e6}, {1e3, 1e6}}, 12, 1);
+  const FitResult r = fit_observation(o, "o", *unknowns, schedule(), quiet());
+  EXPECT_NEAR(r.law.mu, 2e4, 20);
+  EXPECT_NEAR(r.law.lambda, 3e4, 60);
+  EXPECT_LT(r.mse, 1e-10);
+}
+
+TEST(Fit, FindsAKnownLatentCode) {
+  const Hidden hidden;
+  FitOptions options = schedule();
+  options.stages.back().epochs = 40;
+  const FitResult r = fit_observation(hidden.observation, "o", *hidden.unknowns, options, quiet());
+  EXPECT_LT(r.mse, 1e-9);
+  EXPECT_LT(r.mse, 1e-3 * *std::min_element(r.start_mse.begin(), r.start_mse.end()));
+  const std::vector<double>&found = r.law.z, &true_z = hidden.law.z;
+  // What the motion shows: stiffness s/e, yield strain e c₁, ratio of the moduli.
+  EXPECT_NEAR(3 * found[0] - 2 * found[1], 3 * true_z[0] - 2 * true_z[1], 0.02);
+  EXPECT_NEAR(std::exp(2 * found[1]) * (1.5 + 2 * found[2]),
+              std::exp(2 * true_z[1]) * (1.5 + 2 * true_z[2]), 0.02);
+  EXPECT_NEAR(found[3], true_z[3], 0.05);
+}
+
+TEST(Fit, AdamImprovesOnEveryStart) {
+  const Hidden hidden;
+  const FitResult r = fit_observation(hidden.observation, "o", *hidden.unknowns,
+                                      schedule("float32", "adam"), quiet());
+  EXPECT_LT(r.mse, 0.3 * *std::min_element(r.start_mse.begin(), r.start_mse.end()));
+}
+
+TEST(Fit, RefinesTheInitialVelocityTogether) {
+  const Hidden hidden;
+  Observation noisy = hidden.observation;
+  std::mt19937 random(4);
+  std::normal_distribution<double> noise(0, 3e-5);
+  for (double& x : noisy.x) x += noise(random);
+  FitOptions options = schedule("float64");
+  const FitResult plain = fit_observation(noisy, "o", *hidden.unknowns, options, quiet());
+  options.refine_velocity = true;
+  options.stages.back().epochs = 40;
+  const FitResult refined = fit_observation(noisy, "o", *hidden.unknowns, options, quiet());
+  const RigidMotion truth = testing::ObservedScene{}.motion;
+  EXPECT_LT(refined.mse, plain.mse);
+  EXPECT_LT((refined.motion.linear - truth.linear).norm(),
+            (plain.motion.linear - truth.linear).norm());
+}
+
+TEST(Fit, OneAndTwoThreadsGiveTheSameBits) {
+  const Hidden hidden;
+  FitOptions options = schedule();
+  options.stages.back().epochs = 6;
+  const int before = omp_get_max_threads();
+  omp_set_num_threads(1);
+  const FitResult one =
+      fit_observation(hidden.observation, "o", *hidden.unknowns, options, quiet());
+  omp_set_num_threads(2);
+  const FitResult two =
+      fit_observation(hidden.observation, "o", *hidden.unknowns, options, quiet());
+  omp_set_num_threads(before);
+  EXPECT_EQ(one.u, two.u);
+  EXPECT_EQ(one.mse, two.mse);
+  EXPECT_EQ(one.start_mse, two.start_mse);
+  ASSERT_EQ(one.history.size(), two.history.size());
+  for (std::size_t i = 0; i < one.history.size(); ++i) {
+    EXPECT_EQ(one.history[i].mse, two.history[i].mse);
+    EXPECT_EQ(one.history[i].candidate, two.history[i].candidate);
+  }
+}
+
+class StoppedAfter : public ::testing::TestWithParam<int> {};
+
+TEST_P(StoppedAfter, GoesOnToTheSameBits) {
+  const Hidden hidden;
+  FitOptions options = schedule();
+  options.stages.back().epochs = 5;
+  const FitResult whole =
+      fit_observation(hidden.observation, "o", *hidden.unknowns, options, quiet());
+
+  const testing::Scratch scratch;
+  FitHooks hooks = quiet();
+  hooks.state_file = scratch.file("state.h5");
+  hooks.fingerprint = fit_fingerprint(hidden.observation, *hidden.unknowns, "");
+  hooks.save_seconds = 0;
+  struct Stop {};
+  int records = 0;
+  hooks.on_record = [&](const FitRecord&) {
+    if (++records == GetParam()) throw Stop();
+  };
+  EXPECT_THROW(fit_observation(hidden.observation, "o", *hidden.unknowns, options, hooks), Stop);
+  int more = 0;
+  hooks.on_record = [&](const FitRecord&) { ++more; };
+  const FitResult resumed =
+      fit_observation(hidden.observation, "o", *hidden.unknowns, options, hooks);
+  EXPECT_LT(more, static_cast<int>(whole.history.size()));
+  EXPECT_EQ(resumed.u, whole.u);
+  EXPECT_EQ(resumed.mse, whole.mse);
+  EXPECT_EQ(resumed.start_mse, whole.start_mse);
+  ASSERT_EQ(resumed.history.size(), whole.history.size());
+  for (std::size_t i = 0; i < whole.history.size(); ++i) {
+    EXPECT_EQ(resumed.history[i].mse, whole.history[i].mse) << i;
+  }
+}
+
+// In the first stage, between its evaluations; in the second; in the last.
+INSTANTIATE_TEST_SUITE_P(Records, StoppedAfter, ::testing::Values(6, 10, 24, 34));
+
+TEST(Fit, ACandidateThatFailsIsDroppedAndTheOthersGoOn) {
+  Hidden hidden;
+  hidden.model.latents[0] = 6;  // a stress scale of 1e4 exp(18) Pa
+  hidden.model.latents[8] = 2.5;
+  const auto unknowns = make_latent_unknowns(hidden.model);
+  const FitResult r = fit_observation(hidden.observation, "o", *unknowns, schedule(), quiet());
+  EXPECT_TRUE(std::isinf(r.start_mse[0]));
+  EXPECT_LT(r.mse, 1e-6);
+  EXPECT_NE(r.start, 0);
+}
+
+TEST(Fit, NoStartThatRunsIsAnErrorThatSaysWhy) {
+  Hidden hidden;
+  for (int i = 0; i < 8; ++i) hidden.model.latents[4 * i] = 6;
+  const auto unknowns = make_latent_unknowns(hidden.model);
+  const std::string message = testing::error_of(
+      [&] { fit_observation(hidden.observation, "seen.h5", *unknowns, schedule(), quiet()); });
+  EXPECT_THAT(message,
+              HasSubstr("seen.h5: expected that at least one of 8 starts can be simulated"));
+  EXPECT_THAT(message, HasSubstr("particle"));
+}
+
+TEST(Fit, StartsCoverEveryMaterialAndKeepADistance) {
+  const auto unknowns = make_latent_unknowns(testing::readable_model(20));
+  std::vector<double> early(20), full(20);
+  for (int i = 0; i < 20; ++i) {
+    early[i] = i % 2 == 0 ? i + 1 : 100 + i;  // the elastic codes are all better at first
+    full[i] = 20 - i;
+  }
+  const std::vector<int> chosen = choose_starts(*unknowns, early, full, 6);
+  ASSERT_EQ(chosen.size(), 6u);
+  EXPECT_EQ(chosen[0], 0);   // best at the short horizon
+  EXPECT_EQ(chosen[1], 19);  // best over all frames
+  EXPECT_EQ(std::set<int>(chosen.begin(), chosen.end()).size(), 6u);
+  EXPECT_THAT(choose_starts(*unknowns, early, full, 100), ::testing::SizeIs(20));
+  for (int i = 1; i < 20; ++i) early[i] = std::numeric_limits<double>::infinity();
+  full = early;
+  EXPECT_THAT(choose_starts(*unknowns, early, full, 6), ::testing::ElementsAre(0));
+}
+
+TEST(Fit, HorizonsCountFromContact) {
+  EXPECT_EQ(horizon_frames(1, 10, 41), 41);
+  EXPECT_EQ(horizon_frames(0.5, 11, 41), 26);
+  EXPECT_EQ(horizon_frames(0.001, 11, 41), 12);
+  EXPECT_EQ(horizon_frames(0.5, 41, 41), 21);  // no contact at all
+  EXPECT_EQ(horizon_frames(0.001, 41, 41), 2);
+}
+
+TEST(Fit, PicturesAndMetricsOfAResult) {
+  const Hidden hidden;
+  FitOptions options = schedule();
+  options.stages.back().epochs = 3;
+  const Inference inference = infer(hidden.observation, "o", *hidden.unknowns, options, quiet());
+  EXPECT_NEAR(inference.fit_mse, inference.fit.mse, 1e-3 * inference.fit.mse + 1e-12);
+  EXPECT_NEAR(inference.size, 0.25, 1e-9);
+  Metrics metrics;
+  add_metrics(metrics, inference, hidden.observation, *hidden.unknowns);
+  for (const auto& [name, value] : metrics.entries()) EXPECT_TRUE(std::isfinite(value)) << name;
+  EXPECT_EQ(*metrics.find("roll_outs"), static_cast<double>(inference.fit.history.size()));
+  const Chart chart = loss_chart(inference.fit, *hidden.unknowns, "loss");
+  std::size_t points = 0;
+  for (const Series& s : chart.series) points += s.x.size();
+  EXPECT_EQ(chart.series.size(), 4u);
+  EXPECT_EQ(points, inference.fit.history.size());
+}
+
+}  // namespace
+}  // namespace uniphy
