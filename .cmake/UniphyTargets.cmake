@@ -55,8 +55,8 @@ endfunction()
 # includes it; their flags must agree, so all of them compile with OpenMP.
 function(uniphy_use_torch_pch target)
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_GREATER_EQUAL 13)
-    # False alarm on the std::vector<bool> inside torch::autograd::Function::apply.
-    target_compile_options(${target} PRIVATE -Wno-array-bounds)
+    # False alarms on the std::vector<bool> inside torch::autograd::Function::apply.
+    target_compile_options(${target} PRIVATE -Wno-array-bounds -Wno-stringop-overflow)
   endif()
   if(NOT UNIPHY_PCH)
     return()
