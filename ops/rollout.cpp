@@ -182,10 +182,12 @@ RolloutFrames rollout(const Tensor& x0, const Tensor& v0, const Tensor& C0, cons
   for (RolloutBody& body : plan->bodies) body.parameters = Tensor();  // `packed` carries them
   plan->settings = settings;
   const Tensor packed = pack_parameters(bodies);
-  const variable_list out =
-      RolloutFunction::apply(x, checked("rollout", "v0", v0, type, {P, 3}), C, F, packed,
-                             checked("rollout", "mass", mass.detach(), type, {P}),
-                             checked("rollout", "volume", volume.detach(), type, {P}), plan);
+  const Tensor v = checked("rollout", "v0", v0, type, {P, 3});
+  const Tensor m = checked("rollout", "mass", mass, type, {P}).detach();
+  const Tensor V = checked("rollout", "volume", volume, type, {P}).detach();
+  for (const Tensor& t : {x, v, C, F, packed}) plan->record = plan->record || t.requires_grad();
+  plan->record = plan->record && torch::GradMode::is_enabled();
+  const variable_list out = RolloutFunction::apply(x, v, C, F, packed, m, V, plan);
   return {out[0], settings.velocities ? out[1] : Tensor()};
 }
 
