@@ -83,11 +83,14 @@ std::vector<Case> cases() {
     all.push_back({wall == Wall::freeslip ? "grid_update freeslip" : "grid_update noslip",
                    [w](const Tensors& p) { return Tensors{grid_update(p[0], w)}; },
                    [w](const Tensors& p) { return Tensors{reference::grid_update(p[0], w)}; },
-                   [](torch::ScalarType type) {  // a grid as P2G makes it, empty nodes included
-                     const Tensors p = particles(torch::kFloat64);
-                     return Tensors{p2g_reference(p, small_grid())[0].to(type)};
+                   [](torch::ScalarType type) {  // a third of the nodes is empty
+                     torch::manual_seed(2);
+                     const Tensor momentum = uniform({9, 9, 9, 3}, -2e-2, 2e-2, torch::kFloat64);
+                     const Tensor mass = uniform({9, 9, 9, 1}, 0.5e-2, 1.5e-2, torch::kFloat64) *
+                                         (torch::rand({9, 9, 9, 1}) > 0.3).to(torch::kFloat64);
+                     return Tensors{torch::cat({momentum * (mass > 0), mass}, 3).to(type)};
                    },
-                   {1e-8}});
+                   {1e-6}});
   }
   all.push_back({"g2p",
                  [s](const Tensors& p) { return g2p_of(p, s); },

@@ -92,8 +92,12 @@ std::vector<Material> materials() {
   for (const auto form : {kernels::LawForm::isotropic, kernels::LawForm::seed}) {
     LawDescription law;
     law.id = LawId::learned;
-    law.weights = std::make_shared<kernels::LearnedLawWeights>(
-        testing::random_weights(form, 6, 16, 2, kernels::Activation::gelu, 5, 0.5));
+    auto weights = testing::random_weights(form, 6, 16, 2, kernels::Activation::gelu, 5, 0.5);
+    // Untrained, the seed form adds noise to F in every step: keep it small enough to fly.
+    kernels::MlpWeights::Layer& last = weights.projection.layers.back();
+    for (double& w : last.weight) w *= form == kernels::LawForm::seed ? 1e-3 : 1;
+    for (double& b : last.bias) b *= form == kernels::LawForm::seed ? 1e-3 : 1;
+    law.weights = std::make_shared<kernels::LearnedLawWeights>(weights);
     torch::manual_seed(11);
     all.push_back({kernels::form_name(form), law, 0.3 * torch::randn({6}, torch::kFloat64)});
   }
@@ -105,6 +109,11 @@ class RolloutOfMaterial : public ::testing::TestWithParam<int> {};
 TEST_P(RolloutOfMaterial, GradientsAgreeWithCentralDifferences) {
   const Material m = materials()[GetParam()];
   Scene scene;
+  if (m.name == "seed") {
+    // The seed form is not smooth where singular values meet: start with some apart.
+    scene.F = torch::diag(torch::tensor({1.2, 1.0, 0.8}, torch::kFloat64))
+                  .repeat({scene.x.size(0), 1, 1});
+  }
   scene.v.requires_grad_();
   const Tensor parameters = m.parameters.clone().requires_grad_();
   loss_of(scene.run(m.law, parameters).x).backward();
@@ -120,7 +129,7 @@ TEST_P(RolloutOfMaterial, GradientsAgreeWithCentralDifferences) {
       return loss_of(moved.run(m.law, m.parameters).x).item<double>();
     };
     found.push_back((direction * grad_v).sum().item<double>());
-    expected.push_back(central_differences(value, {0}, {1e-6})[0]);
+    expected.push_back(central_differences(value, {0}, {1e-5})[0]);
   }
   EXPECT_LE(relative_error(found, expected), 1e-6) << "v";
 
@@ -131,7 +140,7 @@ TEST_P(RolloutOfMaterial, GradientsAgreeWithCentralDifferences) {
       moved[k] = p[0];
       return loss_of(scene.run(m.law, moved).x).item<double>();
     };
-    const double step = 1e-5 * (m.law.id == LawId::learned ? 1 : at);
+    const double step = 1e-3 * (m.law.id == LawId::learned ? 1 : at);
     const auto difference = central_differences(value, {at}, {step});
     EXPECT_NE(difference[0], 0);
     EXPECT_LE(relative_error({grad_p[k].item<double>()}, difference), 1e-6) << "parameter " << k;
@@ -268,12 +277,14 @@ TEST(Rollout, ErrorsNameTheArgument) {
   EXPECT_EQ(message([](Scene&, RolloutBody&) {}), "no error");
   EXPECT_EQ(message([](Scene& s, RolloutBody&) { s.x = s.x.narrow(1, 0, 2); }),
             "rollout: x0: expected [any, 3] Double on cpu, found [125, 2] Double on cpu");
-  EXPECT_THAT(message([](Scene& s, RolloutBody&) { s.x = {}; }), HasSubstr("x0: expected a Float"));
+  EXPECT_THAT(message([](Scene& s, RolloutBody&) { s.x = Tensor(); }),
+              HasSubstr("x0: expected a Float"));
   EXPECT_THAT(message([&](Scene& s, RolloutBody&) { s.v = single(s.v); }),
               HasSubstr("v0: expected [125, 3] Double on cpu, found [125, 3] Float"));
   EXPECT_THAT(message([&](Scene& s, RolloutBody&) { s.C = s.C[0]; }), HasSubstr("C0: expected"));
   EXPECT_THAT(message([&](Scene& s, RolloutBody&) { s.F = s.F[0]; }), HasSubstr("F0: expected"));
-  EXPECT_THAT(message([&](Scene& s, RolloutBody&) { s.mass = {}; }), HasSubstr("mass: expected"));
+  EXPECT_THAT(message([&](Scene& s, RolloutBody&) { s.mass = Tensor(); }),
+              HasSubstr("mass: expected"));
   EXPECT_THAT(message([&](Scene& s, RolloutBody&) { s.volume = single(s.volume); }),
               HasSubstr("volume: expected"));
   EXPECT_THAT(message([&](Scene& s, RolloutBody&) { s.settings.every = 0; }),
