@@ -76,9 +76,9 @@ UNIPHY_INLINE StressInputs<V> stress_inputs(const Mat3<V>& F) {
 
 /// Runs both networks on one tile; returns Δ and S₁ as planes.
 template <bool keep, class T>
-inline void seed_tile_forward(const LearnedLaw<T>& law, std::ptrdiff_t count,
-                              View<const T> F_trial, View<const T> C, const SeedTile<T>& tile,
-                              const T*& delta, const T*& S1) {
+inline void seed_tile_forward(const LearnedLaw<T>& law, std::ptrdiff_t count, View<const T> F_trial,
+                              View<const T> C, const SeedTile<T>& tile, const T*& delta,
+                              const T*& S1) {
   using V = Lanes<T>;
   using namespace seed_detail;
   constexpr int w = width_of<V>;
@@ -127,8 +127,8 @@ inline void seed_evaluate(const LearnedLaw<T>& law, std::ptrdiff_t count, View<c
   }
 }
 
-/// The adjoint of seed_evaluate, recomputing its forward pass tile by tile. Overwrites grad_F_trial,
-/// adds to grad_C and accumulator (both may be null).
+/// The adjoint of seed_evaluate, recomputing its forward pass tile by tile. Overwrites
+/// grad_F_trial, adds to grad_C and accumulator (both may be null).
 template <class T>
 inline void seed_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, View<const T> F_trial,
                          View<const T> C, View<const T> grad_F_proj, View<const T> grad_tau,
@@ -150,8 +150,8 @@ inline void seed_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, View<co
     sum_log_s = sum_log_s + dot(gS, sym(get3<V>(S1, 0, l)));
   }
   mlp_backward<T>(law.stress, tile.stress_in, tile.stress_tape, tile.grad_stress,
-                  tile.grad_features, accumulator ? accumulator + law.projection.layer[0].out : nullptr,
-                  nullptr);
+                  tile.grad_features,
+                  accumulator ? accumulator + law.projection.layer[0].out : nullptr, nullptr);
   for (std::ptrdiff_t l = 0; l < kTile; l += w) {
     const Mat3<V> F = get3<V>(tile.projection_in, 0, l) + get3<V>(delta, 0, l);
     const StressInputs<V> s = stress_inputs(F);
@@ -178,8 +178,7 @@ inline void seed_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, View<co
     gF = gF + mul(F, g_right + transpose(g_right));
     const V g_J = feature(12) + select<V>(s.J > floor, feature(13) / s.J_safe, zero);
     gF = gF + cofactor(F) * g_J;
-    gF(0, 0) = gF(0, 0) +
-               select<V>(F(0, 0) > floor, feature(14) + feature(15) / s.F_max, zero);
+    gF(0, 0) = gF(0, 0) + select<V>(F(0, 0) > floor, feature(14) + feature(15) / s.F_max, zero);
     gF = gF + load_mat3<V, T>(grad_F_proj, l, count - l, false);
     put3(tile.grad_projection, 0, l, gF);
     if (grad_C && l < count)
@@ -192,10 +191,9 @@ inline void seed_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, View<co
     Vec3<V> g_sigma;
     for (int i = 0; i < 3; ++i)
       g_sigma[i] = V::load_aligned(tile.grad_features + (18 + i) * kTile + l);
-    const Mat3<V> g =
-        svd3_adjoint(svd3(F), get3<V>(tile.grad_features, 9, l), g_sigma,
-                     transpose(get3<V>(tile.grad_features, 21, l))) +
-        get3<V>(tile.grad_features, 0, l) + get3<V>(tile.grad_projection, 0, l);
+    const Mat3<V> g = svd3_adjoint(svd3(F), get3<V>(tile.grad_features, 9, l), g_sigma,
+                                   transpose(get3<V>(tile.grad_features, 21, l))) +
+                      get3<V>(tile.grad_features, 0, l) + get3<V>(tile.grad_projection, 0, l);
     if (grad_F_trial) store_mat3<V, T>(grad_F_trial, l, count - l, g);
   }
   if (accumulator)
