@@ -156,6 +156,9 @@ void draw_pictures(const std::vector<Pictured>& all, RunDirectory& out) {
   plot_chart(out.file("loss.png"), chart);
   ParticlePicture picture;
   picture.columns = 8;
+  picture.panel_pixels = 290;
+  picture.low = 0.13;  // the walls stand at 0.15
+  picture.high = 0.87;
   picture.panels = std::move(panels);
   plot_particles(out.file("strip.png"), picture);
 }

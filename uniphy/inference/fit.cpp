@@ -8,6 +8,7 @@
 #include <exception>
 #include <limits>
 #include <optional>
+#include <set>
 
 #include "ops/kernels/error.hpp"
 #include "uniphy/report/interrupt.hpp"
@@ -298,12 +299,23 @@ class Fit {
     if (next == stages()) add_best_start();
     std::stable_sort(state_.candidates.begin(), state_.candidates.end(),
                      [](const FitCandidate& a, const FitCandidate& b) { return a.loss < b.loss; });
-    if (next < stages()) {
-      const auto keep = static_cast<std::size_t>(options_.stages[next].candidates);
-      if (state_.candidates.size() > keep) state_.candidates.resize(keep);
-    }
+    if (next < stages()) keep_candidates(next);
     state_.stage = next;
     checkpoint(0, true);
+  }
+
+  /// Before the last stage the best of each material stays, as long as there is room: one kind of
+  /// material may explain the first moments better and the rest not at all.
+  void keep_candidates(int next) {
+    const auto room = static_cast<std::size_t>(options_.stages[next].candidates);
+    std::vector<FitCandidate>& all = state_.candidates;  // sorted by loss
+    if (next + 1 < stages()) {
+      std::set<std::string> seen;
+      std::stable_partition(all.begin(), all.end(), [&](const FitCandidate& c) {
+        return seen.insert(unknowns_.label(c.start)).second;
+      });
+    }
+    if (all.size() > room) all.resize(room);
   }
 
   /// The best start over all frames, in case that nothing improved on it.

@@ -79,7 +79,8 @@ struct FitHooks {
 ///    over all frames, and then the best that keep a distance from those chosen: one start that
 ///    fits the first moments may stand for the wrong kind of material and not leave it.
 /// 3. Each stage improves its candidates by gradients; the next one keeps the best at its own,
-///    longer horizon. A candidate whose roll-out fails has infinite loss and goes first.
+///    longer horizon (and, but for the last stage, the best of each material first). A candidate
+///    whose roll-out fails has infinite loss and goes first.
 /// 4. The best evaluation over all frames is the result.
 ///
 /// Candidates are evaluated side by side; results have the same bits for any number of threads.

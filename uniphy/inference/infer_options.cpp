@@ -38,7 +38,7 @@ FitOptions read_fit_options(Section& config) {
       schedule.reals("horizon", std::vector<double>{0.25, 0.5, 1}, Range{0, 1, true}, "",
                      "share of the time from first contact to the end that is compared", sizes);
   const auto candidates =
-      schedule.integers("candidates", std::vector<std::int64_t>{8, 4, 2}, between(1, 10000), "",
+      schedule.integers("candidates", std::vector<std::int64_t>{10, 6, 2}, between(1, 10000), "",
                         "points that are improved; the best go on to the next stage", sizes);
   const auto epochs =
       schedule.integers("epochs", std::vector<std::int64_t>{8, 12, 40}, between(1, 100000), "",

@@ -145,7 +145,7 @@ class Bfgs : public Optimizer {
 
   std::vector<double> pack() const override {
     Packer p;
-    for (const double x : {f_, step_, failures_, updates_}) p.add(x);
+    for (const double x : {f_, step_, failures_, updates_, ever_updated_}) p.add(x);
     for (const Vector* v : {&trial_, &x_, &g_, &direction_}) p.add(*v);
     p.add(inverse_);
     return p.state;
@@ -154,7 +154,7 @@ class Bfgs : public Optimizer {
   void unpack(const std::vector<double>& state) override {
     check_size(state, packed_size());
     Unpacker p{state};
-    for (double* x : {&f_, &step_, &failures_, &updates_}) p.get(*x);
+    for (double* x : {&f_, &step_, &failures_, &updates_, &ever_updated_}) p.get(*x);
     for (Vector* v : {&trial_, &x_, &g_, &direction_}) p.get_matrix(*v);
     p.get_matrix(inverse_);
   }
@@ -165,12 +165,13 @@ class Bfgs : public Optimizer {
     unpack(state);
     trial_ = x_ = start;
     f_ = kInfinity;
+    updates_ = ever_updated_;  // even where the old search ended with a restart
   }
 
  private:
   std::size_t packed_size() const {
     const auto n = static_cast<std::size_t>(x_.size());
-    return 4 + 4 * n + n * n;
+    return 5 + 4 * n + n * n;
   }
 
   void accept(double loss, const Vector& g) {
@@ -228,6 +229,7 @@ class Bfgs : public Optimizer {
     if (!(sy > 1e-10 * s.norm() * y.norm())) return;  // keeps it positive definite
     if (updates_ == 0) inverse_.setIdentity(), inverse_ *= sy / y.squaredNorm();
     ++updates_;
+    ever_updated_ = 1;
     const Vector hy = inverse_ * y;
     const double rho = 1 / sy;
     inverse_ += (rho * rho * (sy + y.dot(hy))) * (s * s.transpose()) -
@@ -235,7 +237,7 @@ class Bfgs : public Optimizer {
   }
 
   OptimizerOptions options_;
-  double f_ = kInfinity, step_ = 1, failures_ = 0, updates_ = 0;
+  double f_ = kInfinity, step_ = 1, failures_ = 0, updates_ = 0, ever_updated_ = 0;
   Vector trial_, x_, g_, direction_;
   Eigen::MatrixXd inverse_;
 };
