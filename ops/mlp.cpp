@@ -44,8 +44,8 @@ void check(const torch::Tensor& x, const std::vector<LinearLayer>& layers) {
   }
 }
 
-/// The weights and biases of all layers one after the other in one tensor (autograd's Function takes
-/// tensors, not lists of them), and the widths that cut it up.
+/// The weights and biases of all layers one after the other in one tensor (autograd's Function
+/// takes tensors, not lists of them), and the widths that cut it up.
 template <class T>
 std::unique_ptr<kernels::PackedMlpStorage<T>> pack(const torch::Tensor& flat,
                                                    const std::vector<std::int64_t>& widths,
@@ -63,8 +63,8 @@ std::unique_ptr<kernels::PackedMlpStorage<T>> pack(const torch::Tensor& flat,
   return std::make_unique<kernels::PackedMlpStorage<T>>(weights, activation, std::vector<double>{});
 }
 
-/// Rows [first, first + kTile) of a row-major [samples, columns] as planes [columns, kTile]; missing
-/// rows are zero.
+/// Rows [first, first + kTile) of a row-major [samples, columns] as planes [columns, kTile];
+/// missing rows are zero.
 template <class T>
 void to_planes(const T* rows, std::int64_t count, std::int64_t columns, T* planes) {
   for (std::int64_t c = 0; c < columns; ++c)

@@ -130,9 +130,9 @@ class LearnedLawKernel final : public LawKernel<T> {
   }
 
  private:
-  /// Output `row` of a network at rest, from the very kernel that the roll-out uses, so that what is
-  /// taken off is exact there. With `bias`, its gradient with respect to the folded first bias is
-  /// added, times `weight`.
+  /// Output `row` of a network at rest, from the very kernel that the roll-out uses, so that what
+  /// is taken off is exact there. With `bias`, its gradient with respect to the folded first bias
+  /// is added, times `weight`.
   T at_rest(const PackedMlp<T>& net, int row, T weight = T(0), T* bias = nullptr) const {
     const std::ptrdiff_t plane = std::ptrdiff_t(net.max_width) * kTile;
     T* scratch = scratch_of_thread<T>(net.tape_scratch() + 3 * plane);
@@ -163,8 +163,8 @@ std::shared_ptr<const LawKernel<T>> make_learned_law(const LawDescription& descr
     throw Error("law learned: expected a latent of " + std::to_string(expected) +
                 " numbers, found " + std::to_string(description.z.size()));
   for (const double z : description.z)
-    if (!std::isfinite(z)) throw Error("law learned: expected a finite latent, found " +
-                                       std::to_string(z));
+    if (!std::isfinite(z))
+      throw Error("law learned: expected a finite latent, found " + std::to_string(z));
   return std::make_shared<LearnedLawKernel<T>>(description);
 }
 template std::shared_ptr<const LawKernel<float>> make_learned_law(const LawDescription&);

@@ -105,8 +105,7 @@ std::shared_ptr<const LearnedLawWeights> without_projection(const LearnedLawWeig
   r->stress = weights.stress;
   r->projection = constant_network(
       shape.projection_in + weights.latent_size,
-      std::vector<double>(shape.projection_out,
-                          weights.form == LawForm::isotropic ? 1e30 : 0.0));
+      std::vector<double>(shape.projection_out, weights.form == LawForm::isotropic ? 1e30 : 0.0));
   return r;
 }
 

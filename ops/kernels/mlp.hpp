@@ -73,9 +73,12 @@ inline void tile_activate(int rows, T* value, T* slope) {
 template <class T>
 inline void tile_activate(Activation a, int rows, T* value, T* slope) {
   switch (a) {
-    case Activation::gelu: return tile_activate<Activation::gelu>(rows, value, slope);
-    case Activation::silu: return tile_activate<Activation::silu>(rows, value, slope);
-    case Activation::squareplus: return tile_activate<Activation::squareplus>(rows, value, slope);
+    case Activation::gelu:
+      return tile_activate<Activation::gelu>(rows, value, slope);
+    case Activation::silu:
+      return tile_activate<Activation::silu>(rows, value, slope);
+    case Activation::squareplus:
+      return tile_activate<Activation::squareplus>(rows, value, slope);
   }
 }
 
@@ -114,8 +117,7 @@ inline T* mlp_forward_tape(const PackedMlp<T>& net, const T* in, T* tape) {
     const PackedLayer<T>& layer = net.layer[k];
     T* to = tape_value(net, tape, k);
     tile_linear(layer.out, layer.in, layer.forward, layer.bias, from, to);
-    if (k + 1 < net.depth)
-      tile_activate(net.activation, layer.out, to, tape_slope(net, tape, k));
+    if (k + 1 < net.depth) tile_activate(net.activation, layer.out, to, tape_slope(net, tape, k));
     from = to;
   }
   return tape_value(net, tape, net.depth - 1);
@@ -123,8 +125,8 @@ inline T* mlp_forward_tape(const PackedMlp<T>& net, const T* in, T* tape) {
 
 /// grad_out [padded(out), kTile] → grad_in [padded(in), kTile] (may be null), given the tape of the
 /// same tile. Rows of grad_out beyond out() are not read. `first_bias`, if given, has the gradient
-/// of the first layer's bias added, [out of layer 0]. `weights`, if given, has one entry a layer; its
-/// sums stay spread over the lanes, so that no tile needs a horizontal sum.
+/// of the first layer's bias added, [out of layer 0]. `weights`, if given, has one entry a layer;
+/// its sums stay spread over the lanes, so that no tile needs a horizontal sum.
 template <class T>
 inline void mlp_backward(const PackedMlp<T>& net, const T* in, T* tape, const T* grad_out,
                          T* grad_in, T* first_bias, const WeightGradient<T>* weights) {
@@ -159,8 +161,7 @@ inline void mlp_backward(const PackedMlp<T>& net, const T* in, T* tape, const T*
           for (int l = w; l < kTile; l += w) sum = sum + V::load_aligned(grad + o * kTile + l);
           first_bias[o] += lane_sum(sum);
         }
-      if (grad_in)
-        tile_linear<T>(layer.in, layer.out, layer.backward, nullptr, grad, grad_in);
+      if (grad_in) tile_linear<T>(layer.in, layer.out, layer.backward, nullptr, grad, grad_in);
       return;
     }
     T* to = buffer[k % 2];

@@ -43,8 +43,8 @@ PackedMlpStorage<T>::PackedMlpStorage(const MlpWeights& weights, Activation acti
     numbers_.push_back(pack<T>(in, out, [&](int r, int c) { return element(c, r); }));
     numbers_.push_back(std::move(bias));
     const std::size_t at = numbers_.size() - 3;
-    layers_.push_back({in, out, numbers_[at].data(), numbers_[at + 1].data(),
-                       numbers_[at + 2].data()});
+    layers_.push_back(
+        {in, out, numbers_[at].data(), numbers_[at + 1].data(), numbers_[at + 2].data()});
     mlp_.max_width = std::max({mlp_.max_width, padded(in), padded(out)});
   }
   mlp_.layer = layers_.data();

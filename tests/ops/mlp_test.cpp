@@ -17,9 +17,10 @@ std::vector<LinearLayer> layers(std::vector<std::int64_t> widths, torch::Dtype t
   torch::manual_seed(4);
   std::vector<LinearLayer> result;
   for (std::size_t k = 0; k + 1 < widths.size(); ++k)
-    result.push_back({(torch::randn({widths[k + 1], widths[k]}, type) /
-                       std::sqrt(double(widths[k]))).requires_grad_(),
-                      torch::randn({widths[k + 1]}, type).requires_grad_()});
+    result.push_back(
+        {(torch::randn({widths[k + 1], widths[k]}, type) / std::sqrt(double(widths[k])))
+             .requires_grad_(),
+         torch::randn({widths[k + 1]}, type).requires_grad_()});
   return result;
 }
 

@@ -89,7 +89,8 @@ LawColumns law_columns(const Dataset& data, kernels::LawForm form) {
   for (std::int64_t i = 0; i < trajectories; ++i) {
     double stress = 0, strain = 0, decrease = 0;
     for (std::int64_t s = data.first[i]; s < data.first[i + 1]; ++s) {
-      const auto trial = kernels::hencky_strain(kernels::svd3(load(data.samples.F, s)).sigma, false);
+      const auto trial =
+          kernels::hencky_strain(kernels::svd3(load(data.samples.F, s)).sigma, false);
       const auto projected =
           kernels::hencky_strain(kernels::svd3(load(data.samples.F_proj, s)).sigma, false);
       const Mat3 tau = load(data.samples.tau, s);

@@ -13,15 +13,15 @@ namespace uniphy {
 /// the projected F, where an isotropic law is diagonal but for the rate of deformation.
 struct IsotropicColumns {
   enum Column {
-    trace = 0,             ///< tr ε of the trial F
-    deviator = 1,          ///< ε̂ of the trial F, 3
-    projected_norm = 4,    ///< ‖ε̂‖ of the projected F
-    projected_trace = 5,   ///< tr ε of the projected F
-    norm_yields = 6,       ///< 1 where the law cuts ‖ε̂‖ back to something, 2 where to 0, else 0
-    trace_yields = 7,      ///< 1 where the law cuts tr ε back, else 0
+    trace = 0,            ///< tr ε of the trial F
+    deviator = 1,         ///< ε̂ of the trial F, 3
+    projected_norm = 4,   ///< ‖ε̂‖ of the projected F
+    projected_trace = 5,  ///< tr ε of the projected F
+    norm_yields = 6,   ///< 1 where the law cuts ‖ε̂‖ back to something, 2 where to 0, else 0
+    trace_yields = 7,  ///< 1 where the law cuts tr ε back, else 0
     projected_deviator = 8,  ///< ε̂ of the projected F, 3
-    rate = 11,             ///< Uᵀ sym(C) U t₀: 00, 11, 22, 01, 02, 12
-    stress = 17,           ///< Uᵀ τ U in Pa, the same order
+    rate = 11,               ///< Uᵀ sym(C) U t₀: 00, 11, 22, 01, 02, 12
+    stress = 17,             ///< Uᵀ τ U in Pa, the same order
     count = 23
   };
 };
@@ -30,18 +30,18 @@ struct IsotropicColumns {
 struct SeedColumns {
   enum Column {
     projection_in = 0,  ///< F, U, Σ, Vᵀ: 30
-    stress_in = 30,     ///< Σ, FᵀF, J, log J, F_max, log F_max, RᵀCR t₀ of the projected F: 25
-    delta = 55,         ///< 9
-    stress = 64,        ///< Rᵀ τ R in Pa, 9
+    stress_in = 30,  ///< Σ, FᵀF, J, log J, F_max, log F_max, RᵀCR t₀ of the projected F: 25
+    delta = 55,      ///< 9
+    stress = 64,     ///< Rᵀ τ R in Pa, 9
     count = 73
   };
 };
 
 /// The scales that a trajectory's errors are measured by.
 struct TrajectoryScale {
-  double stress = 0;      ///< RMS of ‖τ‖, Pa
-  double strain = 0;      ///< RMS of ‖ε‖ of the projected F
-  double decrease = 0;    ///< RMS of the strain that the projection takes; 0 where it takes none
+  double stress = 0;    ///< RMS of ‖τ‖, Pa
+  double strain = 0;    ///< RMS of ‖ε‖ of the projected F
+  double decrease = 0;  ///< RMS of the strain that the projection takes; 0 where it takes none
 };
 
 struct LawColumns {

@@ -56,9 +56,8 @@ std::vector<LawError> law_errors(const Dataset& data,
     const double of_projection = squared_distance(projected.data(), F_proj, 9 * count);
     const double change = squared_distance(F_proj, F, 9 * count);
     errors[i].stress = std::sqrt(of_stress / std::max(stress_size, 1e-300));
-    errors[i].projection =
-        change > 0 ? std::sqrt(of_projection / change)
-                   : std::sqrt(of_projection / double(9 * count));
+    errors[i].projection = change > 0 ? std::sqrt(of_projection / change)
+                                      : std::sqrt(of_projection / double(9 * count));
   }
   return errors;
 }
@@ -70,8 +69,8 @@ void report_law_errors(const Dataset& data, const std::vector<LawError>& errors,
     stress[data.trajectories[i].material].push_back(errors[i].stress);
     projection[data.trajectories[i].material].push_back(errors[i].projection);
   }
-  for (const auto& [name, values] : {std::pair{"stress_error", &stress},
-                                     std::pair{"projection_error", &projection}})
+  for (const auto& [name, values] :
+       {std::pair{"stress_error", &stress}, std::pair{"projection_error", &projection}})
     for (const auto& [material, list] : *values) {
       const std::string key = prefix + name + "." + material;
       metrics.set(key, median(list));

@@ -14,7 +14,7 @@ namespace uniphy {
 /// The law errors of one trajectory, by the metric of the specification, in float64 through the
 /// kernels that simulate.
 struct LawError {
-  double stress = 0;      ///< RMS(τ̂ − τ)/RMS(τ), both of the true projected F
+  double stress = 0;  ///< RMS(τ̂ − τ)/RMS(τ), both of the true projected F
   double projection = 0;  ///< RMS(F̂_proj − F_proj)/RMS(F_proj − F); where the law projects nothing,
                           ///< RMS(F̂_proj − F_proj)
 };

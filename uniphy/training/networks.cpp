@@ -19,8 +19,8 @@ std::vector<LinearLayer> random_mlp(std::int64_t in, std::int64_t out, const Net
     // through silu and gelu.
     const double deviation = (last ? 0.3 : k == 0 ? 1.0 : 1.6) / std::sqrt(double(from));
     torch::Tensor weight = torch::randn({to, from}, generator, torch::kFloat32) * deviation;
-    torch::Tensor bias = last ? torch::zeros({to})
-                              : torch::randn({to}, generator, torch::kFloat32) * 0.1;
+    torch::Tensor bias =
+        last ? torch::zeros({to}) : torch::randn({to}, generator, torch::kFloat32) * 0.1;
     layers.push_back({weight.requires_grad_(), bias.requires_grad_()});
   }
   return layers;
@@ -32,8 +32,8 @@ MlpWeights numbers(const std::vector<LinearLayer>& layers) {
     const torch::Tensor weight = layer.weight.detach().to(torch::kFloat64).contiguous();
     const torch::Tensor bias = layer.bias.detach().to(torch::kFloat64).contiguous();
     const double *w = weight.data_ptr<double>(), *b = bias.data_ptr<double>();
-    mlp.layers.push_back({int(weight.size(1)), int(weight.size(0)), {w, w + weight.numel()},
-                          {b, b + bias.numel()}});
+    mlp.layers.push_back(
+        {int(weight.size(1)), int(weight.size(0)), {w, w + weight.numel()}, {b, b + bias.numel()}});
   }
   return mlp;
 }

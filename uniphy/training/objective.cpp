@@ -77,9 +77,9 @@ LawErrors Objective::isotropic(const Networks& networks, const Tensor& z, const 
   const Tensor trace_cut = column(batch, Column::trace_yields) > 0.5;
   // Where the law does not cut, any cap beyond the strain is right; where it cuts to nothing, any
   // cap at or below zero is.
-  const Tensor of_norm =
-      torch::where(norm_kind > 1.5, torch::relu(cap_q),
-                   torch::where(norm_kind > 0.5, cap_q - projected_norm, torch::relu(norm - cap_q)));
+  const Tensor of_norm = torch::where(
+      norm_kind > 1.5, torch::relu(cap_q),
+      torch::where(norm_kind > 0.5, cap_q - projected_norm, torch::relu(norm - cap_q)));
   const Tensor of_trace =
       torch::where(trace_cut, cap_t - projected_trace, torch::relu(trace - cap_t));
   const Tensor decrease2 = square(norm - projected_norm) + square(trace - projected_trace) / 3.0;
@@ -87,8 +87,8 @@ LawErrors Objective::isotropic(const Networks& networks, const Tensor& z, const 
   const Tensor decrease_rms = scale.select(1, 2).unsqueeze(1);
   const Tensor unit = torch::where(decrease_rms > 0, decrease_rms, strain_rms);
   LawErrors errors;
-  errors.projection = (square(of_norm) + square(of_trace) / 3.0) /
-                      (decrease2 + square(floor_ * unit) + 1e-20);
+  errors.projection =
+      (square(of_norm) + square(of_trace) / 3.0) / (decrease2 + square(floor_ * unit) + 1e-20);
 
   // The stress, in the frame of the projected F.
   const Tensor w = columns(batch, Column::projected_deviator, 3) * inv_e.unsqueeze(2);
@@ -102,13 +102,13 @@ LawErrors Objective::isotropic(const Networks& networks, const Tensor& z, const 
   const Tensor rate_norm =
       torch::sqrt(square(deviatoric).sum(2) + 2.0 * square(off).sum(2) + d * d) - d;
   const Tensor x = (w * deviatoric).sum(2) / (1.0 + rate_norm * strain.q);
-  const Tensor a = network(
-      networks.stress, networks,
-      torch::stack({volumetric, strain.q, strain.cubic, rate_trace, rate_norm, x}, 2), z);
+  const Tensor a =
+      network(networks.stress, networks,
+              torch::stack({volumetric, strain.q, strain.cubic, rate_trace, rate_norm, x}, 2), z);
   const Tensor a_rest = network(networks.stress, networks, torch::zeros({n, 1, 6}), z);
   const Tensor b = a.select(2, 4);
-  const Tensor pressure = a.select(2, 0) * volumetric + a.select(2, 1) - a_rest.select(2, 1) +
-                          b * rate_trace / 3.0;
+  const Tensor pressure =
+      a.select(2, 0) * volumetric + a.select(2, 1) - a_rest.select(2, 1) + b * rate_trace / 3.0;
   const Tensor w2 = square(w);
   const Tensor second = (w2 - w2.mean(2, true)) / (1.0 + strain.q).unsqueeze(2);
   const Tensor tau_diagonal = pressure.unsqueeze(2) + a.narrow(2, 2, 1) * w +

@@ -11,7 +11,8 @@ namespace uniphy {
 
 /// Squared errors of a batch, [N, m] each, relative to
 ///   ‖τ‖² + (floor · RMS of the trajectory)²          (stress)
-///   decrease² + (floor · RMS of the trajectory)²     (projection; where the trajectory's own RMS is
+///   decrease² + (floor · RMS of the trajectory)²     (projection; where the trajectory's own RMS
+///   is
 ///                                                     0, an elastic one, ‖ε‖² takes its place)
 struct LawErrors {
   torch::Tensor stress;

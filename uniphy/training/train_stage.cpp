@@ -136,8 +136,7 @@ RunFunction train_stage(Section& config) {
                 model_file(result.networks, result.z, data, out.config_yaml()), true);
     write_curves(out, result.history);
     write_latents(out, result.z, data);
-    const auto weights =
-        std::make_shared<kernels::LearnedLawWeights>(result.networks.weights());
+    const auto weights = std::make_shared<kernels::LearnedLawWeights>(result.networks.weights());
     report_law_errors(data, law_errors(data, weights, numbers(result.z)), "train.", metrics);
     if (!o.heldout.empty()) {
       const Dataset heldout = read_dataset(o.heldout);

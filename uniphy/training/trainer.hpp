@@ -19,13 +19,13 @@ struct TrainingOptions {
   std::uint64_t seed = 1;
   std::int64_t steps = 20000;
   std::int64_t batch_per_trajectory = 64;  ///< every step sees all trajectories
-  double learning_rate = 3e-3;  ///< of the networks; falls to zero along a cosine
-  double latent_rate = 10;      ///< times learning_rate, for z
+  double learning_rate = 3e-3;             ///< of the networks; falls to zero along a cosine
+  double latent_rate = 10;                 ///< times learning_rate, for z
   double weight_decay = 1e-6;
-  double latent_sigma = 10;     ///< σ of the prior ‖z‖²/σ²
-  double error_floor = 0.1;     ///< see LawErrors
-  double delta = 1e-3;          ///< see Objective::robust_mean
-  double clip = 1;              ///< largest norm of the networks' gradient
+  double latent_sigma = 10;  ///< σ of the prior ‖z‖²/σ²
+  double error_floor = 0.1;  ///< see LawErrors
+  double delta = 1e-3;       ///< see Objective::robust_mean
+  double clip = 1;           ///< largest norm of the networks' gradient
   std::int64_t checkpoint_every = 500;
 };
 

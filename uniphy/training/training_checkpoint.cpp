@@ -73,8 +73,8 @@ void TrainingCheckpoint::save(std::int64_t step) const {
     archive.save_to(temporary.string());
     std::filesystem::rename(temporary, file_);
   } catch (const std::exception& e) {
-    throw Error(file_.string() + ": cannot write the training checkpoint: " +
-                std::string(e.what()).substr(0, 200));
+    throw Error(file_.string() +
+                ": cannot write the training checkpoint: " + std::string(e.what()).substr(0, 200));
   }
 }
 

@@ -118,11 +118,10 @@ class LearnedLawTest : public ::testing::TestWithParam<Parameters> {
 
 TEST_P(LearnedLawTest, GradientsMatchCentralDifferences) {
   const bool seed_form = std::get<0>(GetParam()) == LawForm::seed;
-  const Case cases[] = {{"generic", 0.3, -1, 0},   {"small strain", 1e-3, -1, 0},
-                        {"gap 0", 0.2, 0, 0},      {"gap 1e-12", 0.2, 1e-12, 0},
-                        {"gap 1e-8", 0.2, 1e-8, 0}, {"gap 1e-4", 0.2, 1e-4, 0},
-                        {"gap 1", 0.2, 1, 0},      {"near-singular", 0.2, -1, 2e-3},
-                        {"inverted", 0.2, -1, -0.2}};
+  const Case cases[] = {
+      {"generic", 0.3, -1, 0},      {"small strain", 1e-3, -1, 0},    {"gap 0", 0.2, 0, 0},
+      {"gap 1e-12", 0.2, 1e-12, 0}, {"gap 1e-8", 0.2, 1e-8, 0},       {"gap 1e-4", 0.2, 1e-4, 0},
+      {"gap 1", 0.2, 1, 0},         {"near-singular", 0.2, -1, 2e-3}, {"inverted", 0.2, -1, -0.2}};
   for (const Case& c : cases) {
     // The published form is not differentiable where singular values meet or F inverts: there it
     // must only be finite (the next test).
@@ -134,8 +133,8 @@ TEST_P(LearnedLawTest, GradientsMatchCentralDifferences) {
     Particles p(c, count, 11);
     const Gradients g = adjoint(*law, p);
     Error2 of_F, of_C, of_z;
-    // Where a kink (a yield surface, the clamp) falls into a stencil the difference is no reference:
-    // directions whose two step sizes disagree are left out, and few may be.
+    // Where a kink (a yield surface, the clamp) falls into a stencil the difference is no
+    // reference: directions whose two step sizes disagree are left out, and few may be.
     int kinks = 0, directions = 0;
     const auto compare = [&](double* at, double value, double h, Error2& error) {
       const double keep = *at;
@@ -201,7 +200,8 @@ TEST_P(LearnedLawTest, IsotropicFormIsFrameIndifferentAndSilentAtRest) {
   const auto law = make_learned_law<double>(description(21));
   const Particles p({"generic", 0.2, -1, 0}, 64, 9);
   Particles q = p;
-  const Matrix R = Eigen::AngleAxisd(1.1, Eigen::Vector3d(1, 2, -1).normalized()).toRotationMatrix();
+  const Matrix R =
+      Eigen::AngleAxisd(1.1, Eigen::Vector3d(1, 2, -1).normalized()).toRotationMatrix();
   for (std::size_t k = 0; k < p.F.size(); ++k) {
     q.F[k] = R * p.F[k];
     q.C[k] = R * p.C[k] * R.transpose();
@@ -245,15 +245,15 @@ std::string parameter_name(const ::testing::TestParamInfo<Parameters>& info) {
   return std::string(form_name(std::get<0>(info.param))) + "_" +
          activation_name(std::get<1>(info.param)) + "_" + std::to_string(std::get<2>(info.param));
 }
-INSTANTIATE_TEST_SUITE_P(
-    All, LearnedLawTest,
-    ::testing::Values(Parameters{LawForm::isotropic, Activation::gelu, 3},
-                      Parameters{LawForm::isotropic, Activation::silu, 2},
-                      Parameters{LawForm::isotropic, Activation::squareplus, 1},
-                      Parameters{LawForm::isotropic, Activation::silu, 0},
-                      Parameters{LawForm::seed, Activation::gelu, 2},
-                      Parameters{LawForm::seed, Activation::silu, 0}),
-    parameter_name);
+INSTANTIATE_TEST_SUITE_P(All, LearnedLawTest,
+                         ::testing::Values(Parameters{LawForm::isotropic, Activation::gelu, 3},
+                                           Parameters{LawForm::isotropic, Activation::silu, 2},
+                                           Parameters{LawForm::isotropic, Activation::squareplus,
+                                                      1},
+                                           Parameters{LawForm::isotropic, Activation::silu, 0},
+                                           Parameters{LawForm::seed, Activation::gelu, 2},
+                                           Parameters{LawForm::seed, Activation::silu, 0}),
+                         parameter_name);
 
 TEST(LearnedLaw, RefusesWhatDoesNotFit) {
   LawDescription d;

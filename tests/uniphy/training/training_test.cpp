@@ -80,8 +80,8 @@ class TrainingTest : public ::testing::Test {
  protected:
   void SetUp() override {
     const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
-    directory_ = std::filesystem::temp_directory_path() /
-                 (std::string("uniphy_training_") + test->name());
+    directory_ =
+        std::filesystem::temp_directory_path() / (std::string("uniphy_training_") + test->name());
     std::filesystem::remove_all(directory_);
     std::filesystem::create_directories(directory_);
   }
@@ -118,9 +118,9 @@ TEST_F(TrainingTest, ObjectiveIsTheKernelsError) {
       std::vector<double> F(360), tau(360);
       const double* F_proj = data.samples.F_proj.data() + 9 * data.first[i];
       const double* truth = data.samples.tau.data() + 9 * data.first[i];
-      kernels::make_law<double>(law)->evaluate(
-          40, 1e-4, {F_proj, 9, 1}, {data.samples.C.data() + 9 * data.first[i], 9, 1},
-          {F.data(), 9, 1}, {tau.data(), 9, 1});
+      kernels::make_law<double>(law)->evaluate(40, 1e-4, {F_proj, 9, 1},
+                                               {data.samples.C.data() + 9 * data.first[i], 9, 1},
+                                               {F.data(), 9, 1}, {tau.data(), 9, 1});
       for (int s = 0; s < 40; ++s) {
         double difference = 0, size = 0;
         for (int k = 0; k < 9; ++k) {
@@ -181,8 +181,8 @@ TEST_F(TrainingTest, RefusesForeignAndDamagedCheckpoints) {
   train(data, o, file);
   EXPECT_THAT(message(small_data(20, 9)), ::testing::HasSubstr("belongs to another run"));
   o.network.width = 20;
-  EXPECT_THAT(message(data), ::testing::AllOf(::testing::HasSubstr("width 20"),
-                                              ::testing::HasSubstr("width 16")));
+  EXPECT_THAT(message(data),
+              ::testing::AllOf(::testing::HasSubstr("width 20"), ::testing::HasSubstr("width 16")));
   o.network.width = 16;
   std::filesystem::resize_file(file, std::filesystem::file_size(file) / 2);
   EXPECT_THAT(message(data), ::testing::HasSubstr("expected a training checkpoint"));
