@@ -75,7 +75,7 @@ void seed_columns(const Dataset& data, std::int64_t s, float* row) {
 LawColumns law_columns(const Dataset& data, kernels::LawForm form) {
   LawColumns result;
   const bool isotropic = form == kernels::LawForm::isotropic;
-  result.columns = isotropic ? IsotropicColumns::count : SeedColumns::count;
+  result.columns = isotropic ? int{IsotropicColumns::count} : int{SeedColumns::count};
   const std::int64_t samples = data.samples.size();
   result.values.resize(std::size_t(samples * result.columns));
 #pragma omp parallel for schedule(static)
