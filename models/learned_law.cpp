@@ -80,7 +80,10 @@ LearnedLawImpl::LearnedLawImpl(const LearnedLawOptions& options)
                                   shape.projection_out, generator);
   law.stress = random_network(shape.stress_in + latent_size_, options.stress_hidden,
                               shape.stress_out, generator);
-  if (options.form == kernels::LawForm::isotropic) law.projection.bias.back().fill_(3);
+  if (options.form == kernels::LawForm::isotropic) {
+    law.projection.bias.back().fill_(3);
+    law.projection.bias.back()[2].fill_(0);  // the slope of the cap
+  }
   for (MlpTensors* net : {&law.projection, &law.stress})
     for (auto* tensors : {&net->weight, &net->bias})
       for (Tensor& t : *tensors) t = t.to(options.dtype);

@@ -88,17 +88,23 @@ def project(self, F: Tensor, z: Tensor) -> Tensor:
     c = self.projection_network(torch.cat([torch.stack([t, q, cubic], 1), code], 1))
     zero = torch.zeros([rows.size(0), 3], dtype=f.dtype, device=f.device)
     rest = self.projection_network(torch.cat([zero, rows], 1))
-    c1 = c[:, 0]
+    slope = torch.sinh(torch.clamp(c[:, 2], min=-SLOPE_LIMIT, max=SLOPE_LIMIT))
+    c1 = c[:, 0] + slope * t
     c2 = c[:, 1] - torch.clamp(rest[:, 1], max=0.0)
     norm = torch.sqrt((w * w).sum(1))
     over = (norm > torch.clamp(c1, min=0.0)) | (c1 <= 0.0)
     over_t = t > c2
     one = torch.ones_like(norm)
-    cut = torch.clamp(c1, min=0.0) / torch.where(norm > 0.0, norm, one)
-    scale = torch.where(over, cut, one)
+    stretch = torch.clamp(sigma, min=MINIMUM_STRETCH)
+    share = 1.0 / (1.0 + torch.exp(-torch.clamp(c[:, 3], min=-40.0, max=40.0)) / (stretch * stretch).mean(1))
+    ratio = torch.clamp(c1, min=0.0) / torch.where(norm > 0.0, norm, one)
+    scale = torch.where(over, 1.0 - share + share * ratio, one)
     y = (scale.unsqueeze(1) * w + (torch.where(over_t, c2, t) / 3.0).unsqueeze(1)) * e.unsqueeze(1)
     projected = torch.matmul(U * torch.exp(y).unsqueeze(1), Vt)
-    return torch.where((over | over_t).unsqueeze(1).unsqueeze(2), projected, f).to(F.dtype)
+    projected = torch.where((over | over_t).unsqueeze(1).unsqueeze(2), projected, f)
+    fluid = (c1 < FLUID_CAP) & torch.logical_not(over_t)
+    ball = torch.exp(t * e / 3.0).unsqueeze(1).unsqueeze(2) * torch.eye(3, dtype=f.dtype, device=f.device)
+    return torch.where(fluid.unsqueeze(1).unsqueeze(2), ball, projected).to(F.dtype)
 
 def stress(self, F_proj: Tensor, C: Tensor, z: Tensor) -> Tensor:
     f = self.matrices("F_proj", F_proj, -1)
@@ -235,6 +241,8 @@ std::string script_source(const kernels::LearnedLawWeights& weights, bool single
   text = replaced(text, "TIME_SCALE", literal(kernels::kTimeScale));
   text = replaced(text, "MINIMUM_STRETCH", literal(kernels::kMinimumStretch));
   text = replaced(text, "SMOOTHING", literal(kernels::kInvariantSmoothing));
+  text = replaced(text, "SLOPE_LIMIT", literal(kernels::kSlopeLimit));
+  text = replaced(text, "FLUID_CAP", literal(kernels::kFluidCap));
   text = replaced(text, "EPSILON2", literal(epsilon * epsilon));
   return replaced(text, "TINY", literal(tiny));
 }

@@ -11,16 +11,22 @@
 //
 // With ε = log Σ, t = tr ε, ε̂ its deviator, w = ε̂/e with the strain scale e of z, and the smooth
 // invariants q ≈ ‖w‖, ℓ ≈ Σ wᵢ³/‖w‖² and n ≈ ‖D̂‖ (StrainInvariants):
-//   projection  (c₁, c₂) = g_φ(t/e, q, ℓ, z);  ‖ε̂‖' = min(‖ε̂‖, e max(c₁, 0)),  t' = min(t, e c₂),
-//               log Σ' = ‖ε̂‖' ε̂/‖ε̂‖ + t'/3;  F_proj = F bit for bit below both caps
+//   projection  (c₀, c₂, m, κ) = g_φ(t/e, q, ℓ, z);  c₁ = c₀ + sinh(m) t/e,
+//               ‖ε̂‖' = ‖ε̂‖ − r max(‖ε̂‖ − e max(c₁, 0), 0),  r = 1/(1 + exp(−κ)/b̄),  b̄ = tr(Σ²)/3,
+//               t' = min(t, e c₂),  log Σ' = ‖ε̂‖' ε̂/‖ε̂‖ + t'/3;  F_proj = F bit for bit below
+//               both caps, and exp(t'/3) I where c₁ < −½ and t is below its cap
 //   stress      (k, a₀, a₁, a₂, b) = f_θ(t'/e, q, ℓ, tr D, n, x, z) of the projected F,
 //               D = sym(C) t₀,  x = (w:D̂)/(1 + n q)
 //               τ = s U [(k t'/e + a₀ − a₀(rest)) I + a₁ w + a₂ dev(w²)/(1 + q) + b D] Uᵀ
 //
-// The caps are what makes the laws easy: von Mises is a constant c₁, Drucker–Prager is c₁ linear in
-// t with c₂ = 0 (its apex included: c₁ < 0 where t > 0), a fluid is c₁ < 0, an elastic body has
-// both caps out of reach. Likewise k, a₁ and b are constants for a StVK–Hencky solid and for a
-// viscous stress. c₂ has min(c₂(rest), 0) and a₀ its own answer at F = I, C = 0 taken off, so that
+// The caps are what makes the laws easy: von Mises is a constant c₀; Drucker–Prager a constant m
+// with c₂ = 0 (its apex included: c₁ < 0 where t > 0; the slope spans decades with λ/μ, hence the
+// sinh); a viscoplastic law returns by the share r = 1/(1 + η/(2μ b̄ Δt)) of the way, a constant κ
+// (J. C. Simo, C. Miehe, CMAME 98, 1992, for b̄); a fluid is c₁ < 0, an elastic body has both caps
+// out of reach. A fluid's F forgets its shape, and with it its orientation: only F Fᵀ enters the
+// stress and the next F Fᵀ, so that dropping the rotation moves nothing. Likewise k, a₁ and b are
+// constants for a StVK–Hencky solid and for a viscous
+// stress. c₂ has min(c₂(rest), 0) and a₀ its own answer at F = I, C = 0 taken off, so that
 // nothing yields or moves at rest, whatever the training left. Both maps are exactly
 // frame-indifferent. The adjoint goes by divided differences (spectral.hpp).
 
@@ -63,29 +69,62 @@ UNIPHY_INLINE V safe_inverse(const V& x) {
   return select<V>(positive, V(T(1)) / select<V>(positive, x, V(T(1))), V(T(0)));
 }
 
-/// The gate's answer for one vector of particles, given the caps in units of e.
+/// The caps of one vector of particles, in units of e, and what their adjoint needs.
+template <class V>
+struct Caps {
+  V c1, c2;
+  V slope;        ///< sinh m = dc₁/d(t/e)
+  V per_m;        ///< dc₁/dm
+  V share;        ///< r
+  V mean_square;  ///< b̄
+};
+/// `c`, `features`: the planes of a tile from lane l on, outputs and inputs of the projection.
+template <class V, class T>
+UNIPHY_INLINE Caps<V> caps(const LearnedLaw<T>& law, const T* c, const T* features,
+                           const HenckyStrain<V>& h) {
+  const V one = V(T(1)), half = V(T(0.5)), limit = V(T(kSlopeLimit));
+  Caps<V> r;
+  const V t = V::load_aligned(features), m = V::load_aligned(c + 2 * kTile);
+  const V up = lane_exp(lane_max(lane_min(m, limit), -limit)), down = one / up;
+  r.slope = half * (up - down);
+  r.per_m = select<V>(lane_abs(m) < limit, half * (up + down) * t, V(T(0)));
+  r.c1 = fma(r.slope, t, V::load_aligned(c));
+  r.c2 = V::load_aligned(c + kTile) - V(law.rest_cap);
+  r.mean_square = dot(h.stretch, h.stretch) * V(T(1.0 / 3));
+  // Half the range of exp, so that neither it nor its square overflows in float.
+  const V rate = lane_max(lane_min(V::load_aligned(c + 3 * kTile), V(T(40))), V(T(-40)));
+  r.share = one / (one + lane_exp(-rate) / r.mean_square);
+  return r;
+}
+
+/// The gate's answer for one vector of particles.
 template <class V>
 struct Gate {
-  MaskOf<V> caps_q;  ///< the deviator is cut back to e c₁ > 0
+  Caps<V> cap;
+  MaskOf<V> cuts_q;  ///< the deviator is cut
+  MaskOf<V> caps_q;  ///< towards e c₁ > 0, not towards 0
   MaskOf<V> caps_t;
+  MaskOf<V> fluid;
   MaskOf<V> yields;
+  V ratio;  ///< e max(c₁, 0)/‖ε̂‖
   LogMap<V> map;
 };
 template <class V, class T>
-UNIPHY_INLINE Gate<V> gate(const HenckyStrain<V>& h, const V& c1, const V& c2, T strain_scale) {
-  const V zero(T(0)), one(T(1)), e(strain_scale);
+UNIPHY_INLINE Gate<V> gate(const LearnedLaw<T>& law, const HenckyStrain<V>& h, const T* c,
+                           const T* features) {
+  const V zero(T(0)), one(T(1)), e(law.strain_scale);
   Gate<V> g;
-  const V cap_q = e * lane_max(c1, zero), cap_t = e * c2;
+  g.cap = caps<V>(law, c, features, h);
+  const V cap_q = e * lane_max(g.cap.c1, zero), cap_t = e * g.cap.c2;
   // c₁ ≤ 0 yields even at ‖ε̂‖ = 0, where only the derivative can tell.
-  const MaskOf<V> over = h.norm > cap_q || c1 <= zero;
-  g.caps_q = over && c1 > zero;
+  g.cuts_q = h.norm > cap_q || g.cap.c1 <= zero;
+  g.caps_q = g.cuts_q && g.cap.c1 > zero;
   g.caps_t = h.trace > cap_t;
-  g.yields = over || g.caps_t;
-  const V q = select<V>(over, cap_q, h.norm);
-  const auto deviates = h.norm > V(std::numeric_limits<T>::min());
-  const V scale =
-      select<V>(over, select<V>(deviates, q / select<V>(deviates, h.norm, one), zero), one);
-  g.map = log_map(h, scale, select<V>(g.caps_t, cap_t, h.trace));
+  g.fluid = g.cap.c1 < V(T(kFluidCap)) && !g.caps_t;
+  g.yields = g.cuts_q || g.caps_t;
+  g.ratio = select<V>(g.caps_q, cap_q * safe_inverse(h.norm), zero);
+  const V cut = select<V>(g.fluid, zero, fma(g.cap.share, g.ratio - one, one));
+  g.map = log_map(h, select<V>(g.cuts_q, cut, one), select<V>(g.caps_t, cap_t, h.trace));
   return g;
 }
 
@@ -93,6 +132,16 @@ template <class V, class T>
 UNIPHY_INLINE Vec3<V> projected_sigma(const Gate<V>& g, const Vec3<V>& sigma) {
   Vec3<V> r;
   for (int i = 0; i < 3; ++i) r[i] = select<V>(g.yields, g.map.sigma[i], sigma[i]);
+  return r;
+}
+
+template <class V>
+UNIPHY_INLINE Mat3<V> projected_F(const Gate<V>& g, const Mat3<V>& U, const Mat3<V>& Vm,
+                                  const Mat3<V>& F) {
+  Mat3<V> r = select3(g.yields, compose(U, g.map.sigma, Vm), F);
+  const V zero(ScalarOf<V>(0));
+  for (int k = 0; k < 9; ++k)
+    r.e[k] = select<V>(g.fluid, k % 4 == 0 ? g.map.sigma[0] : zero, r.e[k]);
   return r;
 }
 
@@ -168,7 +217,8 @@ std::ptrdiff_t isotropic_scratch(const LearnedLaw<T>& law) {
 template <class T>
 struct IsotropicTile {
   T *projection_in, *stress_in, *projection_tape, *stress_tape;
-  T *U, *sigma, *V, *grad_projection, *grad_invariants, *grad_stress, *grad_features, *frame;
+  T *U, *sigma, *V, *grad_projection, *grad_invariants, *grad_direct, *grad_stress;
+  T *grad_features, *frame;
   explicit IsotropicTile(const LearnedLaw<T>& law, T* scratch) {
     T* at = scratch;
     const auto take = [&at](std::ptrdiff_t n) {
@@ -183,6 +233,7 @@ struct IsotropicTile {
     stress_in = take(8 * kTile);
     grad_projection = take(4 * kTile);
     grad_invariants = take(4 * kTile);
+    grad_direct = take(kTile);
     grad_stress = take(8 * kTile);
     grad_features = take(8 * kTile);
     frame = take(9 * kTile);
@@ -190,16 +241,6 @@ struct IsotropicTile {
     stress_tape = take(law.stress.tape_scratch());
   }
 };
-
-/// The caps c₁ and c₂ of one vector of particles.
-template <class V, class T>
-UNIPHY_INLINE V cap_q(const T* c, std::ptrdiff_t l) {
-  return V::load_aligned(c + l);
-}
-template <class V, class T>
-UNIPHY_INLINE V cap_t(const LearnedLaw<T>& law, const T* c, std::ptrdiff_t l) {
-  return V::load_aligned(c + kTile + l) - V(law.rest_cap);
-}
 
 template <class V, class T>
 UNIPHY_INLINE void store_plane(T* plane, std::ptrdiff_t l, const V& value) {
@@ -240,8 +281,7 @@ inline void isotropic_tile_forward(const LearnedLaw<T>& law, std::ptrdiff_t coun
     Vec3<V> sigma;
     for (int k = 0; k < 3; ++k) sigma[k] = V::load_aligned(tile.sigma + k * kTile + l);
     const Mat3<V> U = load_plane3<V>(tile.U, l);
-    const Gate<V> g =
-        gate<V, T>(hencky_strain(sigma, false), cap_q<V>(h, l), cap_t<V>(law, h, l), e);
+    const Gate<V> g = gate<V, T>(law, hencky_strain(sigma, false), h + l, tile.projection_in + l);
     const StressState<V> s = stress_state<V, T>(U, projected_sigma<V, T>(g, sigma),
                                                 load_mat3<V, T>(C, l, count - l, false), e, false);
     store_plane(tile.stress_in, l, s.volumetric);
@@ -279,12 +319,10 @@ inline void isotropic_evaluate(const LearnedLaw<T>& law, std::ptrdiff_t count,
     Vec3<V> sigma;
     for (int k = 0; k < 3; ++k) sigma[k] = V::load_aligned(tile.sigma + k * kTile + l);
     const Mat3<V> U = load_plane3<V>(tile.U, l), Vm = load_plane3<V>(tile.V, l);
-    const Gate<V> g =
-        gate<V, T>(hencky_strain(sigma, false), cap_q<V>(h, l), cap_t<V>(law, h, l), e);
+    const Gate<V> g = gate<V, T>(law, hencky_strain(sigma, false), h + l, tile.projection_in + l);
     const StressState<V> s = stress_state<V, T>(U, projected_sigma<V, T>(g, sigma),
                                                 load_mat3<V, T>(C, l, count - l, false), e, false);
-    if (F_proj)
-      store_mat3<V, T>(F_proj, l, count - l, select3(g.yields, compose(U, g.map.sigma, Vm), F));
+    if (F_proj) store_mat3<V, T>(F_proj, l, count - l, projected_F(g, U, Vm, F));
     if (tau)
       store_mat3<V, T>(tau, l, count - l,
                        basis_stress(s, U, load_coefficients<V>(law, a, l)) * V(law.stress_scale));

@@ -28,7 +28,7 @@ inline void isotropic_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, Vi
     U = load_plane3<V>(tile.U, l);
     for (int k = 0; k < 3; ++k) sigma[k] = V::load_aligned(tile.sigma + k * kTile + l);
     strain = hencky_strain(sigma, true);
-    g = gate<V, T>(strain, cap_q<V>(h, l), cap_t<V>(law, h, l), e);
+    g = gate<V, T>(law, strain, h + l, tile.projection_in + l);
     s = stress_state<V, T>(U, projected_sigma<V, T>(g, sigma),
                            load_mat3<V, T>(C, l, count - l, false), e, true);
   };
@@ -108,7 +108,9 @@ inline void isotropic_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, Vi
       const V t = S(i, j) * (c.a1 + c.a2 * (v.w[i] + v.w[j]) * s.spread);
       G(i, j) = G(j, i) = fma(g_aligned, s.rate_frame(i, j), t) * inv_e;
     }
-    Mat3<V> A = tmul(U, mul(load_mat3<V, T>(grad_F_proj, l, count - l, false), Vm));
+    // A fluid's F_proj is U Σ' Uᵀ = exp(t'/3) I.
+    Mat3<V> A =
+        tmul(U, mul(load_mat3<V, T>(grad_F_proj, l, count - l, false), select3(g.fluid, U, Vm)));
     const Vec3<V> sigma_p = projected_sigma<V, T>(g, sigma);
     add_strain_gradient(s.h, gd, g_volumetric * inv_e, A);
     add_symmetric_adjoint(sigma_p, s.h.divided, G, A);
@@ -125,20 +127,32 @@ inline void isotropic_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, Vi
     V g_scale, g_trace;
     Vec3<V> g_dev;
     const Mat3<V> B = log_map_adjoint(strain, sigma, g.map, A, g_scale, g_trace, g_dev);
-    // scale = ‖ε̂‖'/‖ε̂‖ with ‖ε̂‖' = e c₁ where capped: nothing below the cap, where it is 1.
-    const V inv_norm = safe_inverse(strain.norm), c1 = cap_q<V>(h, l), c2 = cap_t<V>(law, h, l);
-    const V g_c1 = select<V>(g.caps_q, g_scale * inv_norm * V(e), zero);
+    // scale = ‖ε̂‖'/‖ε̂‖ = 1 − r + r ratio where cut; nothing below the cap, where it is 1.
+    const V inv_norm = safe_inverse(strain.norm), share = g.cap.share;
+    const V g_ratio = select<V>(g.caps_q, g_scale * share, zero);
+    const V g_share = select<V>(g.cuts_q && !g.fluid, g_scale * (g.ratio - one), zero);
+    const V g_rate = g_share * share * (one - share);  // dL/dκ = dL/d(log b̄)
+    const V g_c1 = g_ratio * inv_norm * V(e);
     const V g_c2 = select<V>(g.caps_t, g_trace * V(e), zero);
-    const V g_norm = select<V>(g.caps_q, -g_scale * g.map.scale * inv_norm, zero);
+    const V g_norm = -g_ratio * g.ratio * inv_norm;
     for (int i = 0; i < 3; ++i)
       g_dev[i] = select<V>(g.yields, fma(g_norm * inv_norm, strain.deviator[i], g_dev[i]), zero);
     g_trace = select<V>(g.yields && !g.caps_t, g_trace, zero);
     Mat3<V> D = select3(g.yields, B, A);
+    D = select3(g.fluid, zero3<V>(), D);
     add_strain_gradient(strain, g_dev, g_trace, D);
+    // b̄ = Σ max(σ, floor)²/3, and slope is 1/σ where σ moves it.
+    const V g_square = two * third * g_rate / g.cap.mean_square;
+    for (int i = 0; i < 3; ++i)
+      D(i, i) = fma(g_square * strain.stretch[i] * strain.stretch[i], strain.slope[i], D(i, i));
     store_plane(tile.grad_projection, l, g_c1);
     store_plane(tile.grad_projection + kTile, l, g_c2);
+    store_plane(tile.grad_projection + 2 * kTile, l, g_c1 * g.cap.per_m);
+    store_plane(tile.grad_projection + 3 * kTile, l, g_rate);
+    // What c₁ owes to t/e directly waits for the network's own part.
+    store_plane(tile.grad_direct, l, g_c1 * g.cap.slope);
     sum_cap = sum_cap + g_c2;
-    sum_log_e = sum_log_e + ge + g_c1 * c1 + g_c2 * c2;
+    sum_log_e = sum_log_e + ge + g_c1 * g.cap.c1 + g_c2 * g.cap.c2;
     for (int k = 0; k < 9; ++k) store_plane(tile.frame + k * kTile, l, D.e[k]);
   }
 
@@ -151,7 +165,7 @@ inline void isotropic_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, Vi
     for (int k = 0; k < 3; ++k) sigma[k] = V::load_aligned(tile.sigma + k * kTile + l);
     const HenckyStrain<V> strain = hencky_strain(sigma, true);
     const StrainInvariants<V> v = strain_invariants(strain, inv_e);
-    const V gt = V::load_aligned(invariant + l);
+    const V gt = V::load_aligned(invariant + l) + V::load_aligned(tile.grad_direct + l);
     const V gq = V::load_aligned(invariant + kTile + l);
     const V gl = V::load_aligned(invariant + 2 * kTile + l);
     sum_log_e = sum_log_e - gt * strain.trace * inv_e;

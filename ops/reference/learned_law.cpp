@@ -61,8 +61,8 @@ Invariants invariants(const Tensor& H, const Tensor& e) {
 Tensor isotropic_project(const LearnedLawTensors& law, const Tensor& F, const Tensor& z) {
   const Tensor H = hencky_tensor(F);
   const Tensor e = strain_scale(z);
-  const Tensor caps = isotropic_caps(law, H, z);
-  const Tensor c1 = caps.select(1, 0), cap_q = e * c1.clamp_min(0), cap_t = e * caps.select(1, 1);
+  const IsotropicCaps caps = isotropic_caps(law, H, z);
+  const Tensor cap_q = e * caps.c1.clamp_min(0), cap_t = e * caps.c2;
   const Tensor H_dev = deviator(H), t = trace_of(H), norm2 = contract(H_dev, H_dev);
   const Tensor one = torch::ones_like(norm2);
   const double tiny = H.scalar_type() == torch::kFloat64
@@ -71,12 +71,15 @@ Tensor isotropic_project(const LearnedLawTensors& law, const Tensor& F, const Te
   const Tensor deviates = norm2 > tiny;
   const Tensor norm = torch::where(deviates, norm2, one).sqrt();
   // c₁ ≤ 0 yields even at ‖ε̂‖ = 0, where only the derivative can tell.
-  const Tensor over = (deviates & (norm > cap_q)) | (c1 <= 0), over_t = t > cap_t;
-  const Tensor scale = torch::where(over, cap_q / norm * deviates, one);
+  const Tensor over = (deviates & (norm > cap_q)) | (caps.c1 <= 0), over_t = t > cap_t;
+  const Tensor cut = 1 - caps.share + caps.share * cap_q / norm * deviates;
+  const Tensor scale = torch::where(over, cut, one);
   const Tensor trace_proj = torch::where(over_t, cap_t, t);
   const Tensor M = at_matrix(scale) * H_dev + at_matrix(trace_proj / 3) * identity(F);
   const Tensor yielded = symmetric_exp(M).matmul(polar_rotation(F, signed_svd(F.detach())));
-  return torch::where(at_matrix(over | over_t), yielded, F);
+  const Tensor projected = torch::where(at_matrix(over | over_t), yielded, F);
+  const Tensor fluid = (caps.c1 < kernels::kFluidCap) & ~over_t;
+  return torch::where(at_matrix(fluid), at_matrix((t / 3).exp()) * identity(F), projected);
 }
 
 constexpr double kSeedFloor = 1e-6;
@@ -146,11 +149,17 @@ Tensor strain_scale(const Tensor& z) {
   return kernels::kStrainScale * torch::exp(kernels::kStrainRate * z.select(-1, 1));
 }
 
-Tensor isotropic_caps(const LearnedLawTensors& law, const Tensor& H, const Tensor& z) {
+IsotropicCaps isotropic_caps(const LearnedLawTensors& law, const Tensor& H, const Tensor& z) {
   const Invariants v = invariants(H, strain_scale(z));
   const Tensor c = law.mlp(law.projection, law.activation, torch::stack({v.t, v.q, v.cubic}, 1), z);
   const Tensor rest = at_rest(law, law.projection, z).select(1, 1).clamp_max(0);
-  return torch::stack({c.select(1, 0), c.select(1, 1) - rest}, 1);
+  const Tensor slope = c.select(1, 2).clamp(-kernels::kSlopeLimit, kernels::kSlopeLimit).sinh();
+  const Tensor mean_square = trace_of(symmetric_exp(2 * H)) / 3;
+  IsotropicCaps caps;
+  caps.c1 = c.select(1, 0) + slope * v.t;
+  caps.c2 = c.select(1, 1) - rest;
+  caps.share = 1 / (1 + (-c.select(1, 3).clamp(-40, 40)).exp() / mean_square);
+  return caps;
 }
 
 Tensor isotropic_stress(const LearnedLawTensors& law, const Tensor& H, const Tensor& C,

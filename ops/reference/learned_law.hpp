@@ -51,8 +51,13 @@ torch::Tensor learned_stress(const LearnedLawTensors& law, const torch::Tensor& 
 // The isotropic form in steps, for training: everything that does not depend on z, the Hencky
 // strain H = U log(max(Σ, 0.05)) Uᵀ [P, 3, 3] (isotropic_tensors.hpp), can be computed once.
 
-/// The caps of ‖dev H‖ and tr H in units of e, (c₁, c₂ − min(c₂(rest), 0)), [P, 2].
-torch::Tensor isotropic_caps(const LearnedLawTensors& law, const torch::Tensor& H,
+/// What the projection network says of every particle, each [P].
+struct IsotropicCaps {
+  torch::Tensor c1;     ///< cap of ‖dev H‖ in units of e
+  torch::Tensor c2;     ///< cap of tr H in units of e, min(c₂(rest), 0) taken off
+  torch::Tensor share;  ///< r, of what exceeds the cap of ‖dev H‖ that is taken off
+};
+IsotropicCaps isotropic_caps(const LearnedLawTensors& law, const torch::Tensor& H,
                              const torch::Tensor& z);
 /// τ, given H of the projected F.
 torch::Tensor isotropic_stress(const LearnedLawTensors& law, const torch::Tensor& H,

@@ -40,15 +40,17 @@ MlpWeights linear(int in, std::vector<double> bias) {
   return {{layer}};
 }
 
-/// The isotropic form of the StVK-Hencky solid τ = 2μ ε + λ tr ε, with the caps (c₁, c₂) and
-/// c₁ + slope t/e.
-LearnedLawWeights hencky_solid(double mu, double lambda, double c1, double c2, double slope = 0) {
+constexpr double kWholeWay = 40;  ///< κ of a law that returns to its cap at once
+
+/// The isotropic form of the StVK-Hencky solid τ = 2μ ε + λ tr ε, with the caps c₁ + slope t/e and
+/// c₂ and the return rate κ.
+LearnedLawWeights hencky_solid(double mu, double lambda, double c1, double c2, double slope = 0,
+                               double rate = kWholeWay) {
   const double strain_over_stress = kernels::kStrainScale / kernels::kStressScale;
   LearnedLawWeights w;
   w.form = LawForm::isotropic;
   w.latent_size = 2;  // z = 0: the scales are their constants
-  w.projection = linear(3 + 2, {c1, c2});
-  w.projection.layers[0].weight[0] = slope;
+  w.projection = linear(3 + 2, {c1, c2, std::asinh(slope), rate});
   const double bulk = lambda + 2.0 / 3.0 * mu;
   w.stress = linear(6 + 2, {bulk * strain_over_stress, 0, 2 * mu * strain_over_stress, 0, 0});
   return w;
@@ -138,6 +140,32 @@ TEST(LearnedLaw, WithACapLinearInTheTraceIsSand) {
   const Largest largest = difference(*learned, *kernels::make_law<double>(d));
   EXPECT_LE(largest.projection, 1e-13);
   EXPECT_LE(largest.stress, 1e-11);
+}
+
+TEST(LearnedLaw, WithACapAndARateIsNonNewtonian) {
+  const double mu = 1e5, lambda = 2e5, tau_y = 7e3, eta = 30, dt = 1e-4;  // dt of difference()
+  const double cap = tau_y / (2 * mu) / kernels::kStrainScale;
+  const auto learned = kernels::make_law<double>(
+      described(hencky_solid(mu, lambda, cap, 1e6, 0, std::log(2 * mu * dt / eta)), {0, 0}));
+  LawDescription d;
+  d.id = LawId::non_newtonian;
+  d.mu = mu;
+  d.lambda = lambda;
+  d.tau_y = tau_y;
+  d.eta = eta;
+  const Largest largest = difference(*learned, *kernels::make_law<double>(d));
+  EXPECT_LE(largest.projection, 1e-13);
+  EXPECT_LE(largest.stress, 1e-11);
+}
+
+TEST(LearnedLaw, WithoutStrengthProjectsLikeAFluid) {
+  const auto learned =
+      kernels::make_law<double>(described(hencky_solid(1e5, 2e5, -1, 1e6), {0, 0}));
+  LawDescription d;
+  d.id = LawId::newtonian;
+  d.mu = 100;
+  d.lambda = 1e4;
+  EXPECT_LE(difference(*learned, *kernels::make_law<double>(d)).projection, 1e-13);
 }
 
 }  // namespace

@@ -36,7 +36,9 @@ void isotropic_columns(const Dataset& data, std::int64_t s, float* row) {
   const auto strain = kernels::hencky_strain(svd.sigma, false);
   row[Column::trace] = float(trial.trace);
   for (int i = 0; i < 3; ++i) row[Column::deviator + i] = float(trial.deviator[i]);
-  row[Column::projected_norm] = float(strain.norm);
+  // Differences in float64: a viscoplastic law may take a millionth of the strain.
+  row[Column::norm_decrease] = float(trial.norm - strain.norm);
+  row[Column::trace_decrease] = float(trial.trace - strain.trace);
   row[Column::projected_trace] = float(strain.trace);
   const bool cuts = trial.norm - strain.norm > kNoDecrease;
   row[Column::norm_yields] = !cuts ? 0.0F : strain.norm < kNoDecrease ? 2.0F : 1.0F;

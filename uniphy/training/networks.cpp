@@ -5,6 +5,9 @@
 namespace uniphy {
 namespace {
 
+/// κ of a new law: it returns nearly all the way to the cap.
+constexpr double kInitialRate = 3;
+
 using kernels::MlpWeights;
 using ops::LinearLayer;
 
@@ -57,6 +60,11 @@ Networks Networks::random(const NetworkOptions& options, torch::Generator& gener
   Networks n;
   n.options = options;
   n.projection = random_mlp(shape.projection_in, shape.projection_out, options, generator);
+  if (options.form == kernels::LawForm::isotropic) {
+    torch::NoGradGuard no_grad;
+    n.projection.back().bias[3].fill_(kInitialRate);
+    if (!options.state_caps) n.projection.front().weight.narrow(1, 0, shape.projection_in).zero_();
+  }
   n.stress = random_mlp(shape.stress_in, shape.stress_out, options, generator);
   return n;
 }

@@ -17,6 +17,7 @@ struct NetworkOptions {
   std::int64_t latent_size = 8;
   std::int64_t hidden_layers = 3;
   std::int64_t width = 32;
+  bool state_caps = true;  ///< isotropic form: the caps answer to the state, or to z alone
 };
 
 /// The two networks as leaf tensors (float32) that an optimizer moves.

@@ -19,6 +19,9 @@ Tensor network(const std::vector<ops::LinearLayer>& layers, const Networks& netw
 Tensor columns(const Tensor& batch, int first, int count) { return batch.narrow(2, first, count); }
 Tensor column(const Tensor& batch, int index) { return batch.select(2, index); }
 
+/// The least weight of a cap that is missed where the law does not cut.
+constexpr double kLeastShare = 0.05;
+
 /// Invariants of w [N, m, 3], as in ops/kernels/isotropic_law.hpp.
 struct Invariants {
   Tensor q, cubic;
@@ -46,16 +49,16 @@ Objective::Objective(const LawColumns& columns, kernels::LawForm form, double fl
 }
 
 LawErrors Objective::errors(const Networks& networks, const Tensor& z, const Tensor& rows,
-                            const Tensor& scale_rows) const {
+                            const Tensor& scale_rows, bool whole_way) const {
   const Tensor batch = columns_.index_select(0, rows.reshape({-1}))
                            .view({rows.size(0), rows.size(1), columns_.size(1)});
   const Tensor scale = scales_.index_select(0, scale_rows);
-  return form_ == kernels::LawForm::isotropic ? isotropic(networks, z, batch, scale)
+  return form_ == kernels::LawForm::isotropic ? isotropic(networks, z, batch, scale, whole_way)
                                               : seed(networks, z, batch, scale);
 }
 
 LawErrors Objective::isotropic(const Networks& networks, const Tensor& z, const Tensor& batch,
-                               const Tensor& scale) const {
+                               const Tensor& scale, bool whole_way) const {
   using Column = IsotropicColumns;
   const Tensor s = kernels::kStressScale * torch::exp(kernels::kStressRate * z.select(1, 0));
   const Tensor e = kernels::kStrainScale * torch::exp(kernels::kStrainRate * z.select(1, 1));
@@ -65,30 +68,51 @@ LawErrors Objective::isotropic(const Networks& networks, const Tensor& z, const 
   // The projection: caps on ‖ε̂‖ and tr ε.
   const Tensor deviator = columns(batch, Column::deviator, 3), trace = column(batch, Column::trace);
   const Invariants trial = invariants(deviator * inv_e.unsqueeze(2));
-  const Tensor c = network(networks.projection, networks,
-                           torch::stack({trace * inv_e, trial.q, trial.cubic}, 2), z);
   const Tensor c_rest = network(networks.projection, networks, torch::zeros({n, 1, 3}), z);
-  const Tensor cap_q = e1 * c.select(2, 0);
+  const Tensor c = networks.options.state_caps
+                       ? network(networks.projection, networks,
+                                 torch::stack({trace * inv_e, trial.q, trial.cubic}, 2), z)
+                       : c_rest;
+  const Tensor slope =
+      torch::sinh(c.select(2, 2).clamp(-kernels::kSlopeLimit, kernels::kSlopeLimit));
+  const Tensor c1 = c.select(2, 0) + slope * trace * inv_e;
+  const Tensor cap_q = e1 * c1;
   const Tensor cap_t = e1 * (c.select(2, 1) - c_rest.select(2, 1).clamp_max(0.0));
+  const Tensor mean_square =
+      torch::exp(2.0 * (deviator + trace.unsqueeze(2) / 3.0)).mean(2);  // b̄, where nothing clamps
+  const Tensor share = whole_way
+                           ? torch::ones_like(mean_square)
+                           : 1.0 / (1.0 + torch::exp(-c.select(2, 3).clamp(-40, 40)) / mean_square);
   const Tensor norm = deviator.norm(2, 2);
   const Tensor norm_kind = column(batch, Column::norm_yields);
-  const Tensor projected_norm = column(batch, Column::projected_norm);
+  const Tensor norm_decrease = column(batch, Column::norm_decrease);
+  const Tensor trace_decrease = column(batch, Column::trace_decrease);
   const Tensor projected_trace = column(batch, Column::projected_trace);
   const Tensor trace_cut = column(batch, Column::trace_yields) > 0.5;
-  // Where the law does not cut, any cap beyond the strain is right; where it cuts to nothing, any
-  // cap at or below zero is.
-  const Tensor of_norm = torch::where(
-      norm_kind > 1.5, torch::relu(cap_q),
-      torch::where(norm_kind > 0.5, cap_q - projected_norm, torch::relu(norm - cap_q)));
+  // Where the law does not cut, any cap beyond the strain is right, the less so the smaller the
+  // share; where it cuts to nothing, any cap at or below zero is.
+  const Tensor missed = torch::relu(norm - cap_q) * share.detach().clamp_min(kLeastShare);
+  const Tensor of_norm =
+      torch::where(norm_kind > 1.5, norm - share * (norm - torch::relu(cap_q)),
+                   torch::where(norm_kind > 0.5, share * (norm - cap_q) - norm_decrease, missed));
+  // Whatever the share, a cap is no higher than what a sample that yields comes down to. Without
+  // this a share near 0 would hide a cap that is far too high.
+  const Tensor above =
+      torch::where((norm_kind > 0.5) & (norm_kind < 1.5), torch::relu(cap_q - norm + norm_decrease),
+                   torch::zeros_like(norm));
+  // A fluid's cap is to lie below kFluidCap, with some room.
+  const Tensor of_fluid = torch::where((norm_kind > 1.5) & ~trace_cut,
+                                       0.1 * norm * torch::relu(c1 - 2 * kernels::kFluidCap), 0.0);
   const Tensor of_trace =
       torch::where(trace_cut, cap_t - projected_trace, torch::relu(trace - cap_t));
-  const Tensor decrease2 = square(norm - projected_norm) + square(trace - projected_trace) / 3.0;
+  const Tensor decrease2 = square(norm_decrease) + square(trace_decrease) / 3.0;
   const Tensor strain_rms = scale.select(1, 1).unsqueeze(1);
   const Tensor decrease_rms = scale.select(1, 2).unsqueeze(1);
   const Tensor unit = torch::where(decrease_rms > 0, decrease_rms, strain_rms);
   LawErrors errors;
   errors.projection =
-      (square(of_norm) + square(of_trace) / 3.0) / (decrease2 + square(floor_ * unit) + 1e-20);
+      (square(of_norm) + square(above) + square(of_fluid) + square(of_trace) / 3.0) /
+      (decrease2 + square(floor_ * unit) + 1e-20);
 
   // The stress, in the frame of the projected F.
   const Tensor w = columns(batch, Column::projected_deviator, 3) * inv_e.unsqueeze(2);

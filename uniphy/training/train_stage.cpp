@@ -34,6 +34,9 @@ TrainStageOptions read(Section& config) {
   network.latent_size =
       model.integer("latent_size", 8, between(1, 256), "", "numbers in a latent code");
   network.hidden_layers = model.integer("hidden_layers", 3, between(0, 16), "", "of each network");
+  network.state_caps = model.choice("caps", "state", {"state", "constant"},
+                                    "of the isotropic form: functions of the state and z, or of z "
+                                    "alone") == "state";
   network.width = model.integer("width", 32, between(1, 1024), "", "of each hidden layer");
 
   Section t = config.section("training", "AdamW on all trajectories at once");

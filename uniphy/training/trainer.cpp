@@ -15,6 +15,7 @@ namespace {
 using torch::Tensor;
 
 constexpr std::int64_t kReportEvery = 100;
+constexpr double kCapsFirst = 0.3;  ///< share of the steps with Objective::errors' whole_way
 
 /// z before training. The scale coordinates start at the trajectory's own stress and strain, so
 /// that both networks see numbers near one from the first step; the others start small.
@@ -84,8 +85,9 @@ TrainingResult train(const Dataset& data, const TrainingOptions& o,
     set_rate(optimizer, 0, cosine(o.learning_rate, step, o.steps));
     set_rate(optimizer, 1, cosine(o.learning_rate * o.latent_rate, step, o.steps));
     optimizer.zero_grad();
-    const LawErrors errors = objective.errors(result.networks, result.z,
-                                              sampler.rows(step, o.batch_per_trajectory), all);
+    const LawErrors errors =
+        objective.errors(result.networks, result.z, sampler.rows(step, o.batch_per_trajectory), all,
+                         double(step) < kCapsFirst * double(o.steps));
     const Tensor prior = result.z.pow(2).sum(1).mean() / (o.latent_sigma * o.latent_sigma);
     const Tensor loss = Objective::robust_mean(errors.stress, o.delta) +
                         Objective::robust_mean(errors.projection, o.delta) + prior * 1e-2;
@@ -116,7 +118,7 @@ Tensor fit_latents(const Dataset& data, const Networks& networks, const Tensor& 
   const std::int64_t n = sampler.trajectories(), codes = training_z.size(0);
   const std::int64_t starts = std::min(o.starts, codes);
   const auto loss_of = [&](const Tensor& z, const Tensor& rows, const Tensor& of) {
-    const LawErrors e = objective.errors(networks, z, rows, of);
+    const LawErrors e = objective.errors(networks, z, rows, of, /*whole_way=*/false);
     return torch::log1p(e.stress / o.delta).mean(1) + torch::log1p(e.projection / o.delta).mean(1);
   };
   // Which training codes answer best, a code at a time against all trajectories.
