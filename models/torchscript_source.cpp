@@ -78,6 +78,22 @@ def invariants(self, sigma: Tensor, e: Tensor) -> Tuple[Tensor, Tensor, Tensor, 
     root2 = (w * w).sum(1) + SMOOTHING * SMOOTHING
     return w, t / e, torch.sqrt(root2) - SMOOTHING, (w * w * w).sum(1) / root2
 
+def sinh_of(self, x: Tensor) -> Tensor:
+    return torch.sinh(torch.clamp(x, min=-SINH_LIMIT, max=SINH_LIMIT))
+
+def exponent_of(self, x: Tensor) -> Tensor:
+    return torch.clamp(x, min=-EXPONENT_LIMIT, max=EXPONENT_LIMIT)
+
+# x exp(delta x) sinh(gamma x)/(gamma x)
+def measure(self, x: Tensor, gamma: Tensor, delta: Tensor) -> Tensor:
+    y = torch.clamp(gamma * x, min=-ARGUMENT_LIMIT, max=ARGUMENT_LIMIT)
+    small = torch.abs(y) < 1e-2
+    far = torch.where(small, torch.ones_like(y), y)
+    y2 = y * y
+    near = 1.0 + y2 / 6.0 * (1.0 + y2 / 20.0 * (1.0 + y2 / 42.0 * (1.0 + y2 / 72.0)))
+    ratio = torch.where(small, near, torch.sinh(far) / far)
+    return x * torch.exp(torch.clamp(delta * x, min=-ARGUMENT_LIMIT, max=ARGUMENT_LIMIT)) * ratio
+
 def project(self, F: Tensor, z: Tensor) -> Tensor:
     f = self.matrices("F", F, -1)
     rows = self.latent(z, f.size(0))
@@ -88,7 +104,7 @@ def project(self, F: Tensor, z: Tensor) -> Tensor:
     c = self.projection_network(torch.cat([torch.stack([t, q, cubic], 1), code], 1))
     zero = torch.zeros([rows.size(0), 3], dtype=f.dtype, device=f.device)
     rest = self.projection_network(torch.cat([zero, rows], 1))
-    slope = torch.sinh(torch.clamp(c[:, 2], min=-SLOPE_LIMIT, max=SLOPE_LIMIT))
+    slope = self.sinh_of(c[:, 2])
     c1 = c[:, 0] + slope * t
     c2 = c[:, 1] - torch.clamp(rest[:, 1], max=0.0)
     norm = torch.sqrt((w * w).sum(1))
@@ -121,11 +137,17 @@ def stress(self, F_proj: Tensor, C: Tensor, z: Tensor) -> Tensor:
     a = self.stress_network(torch.cat([torch.stack([t, q, cubic, D_trace, n, x], 1), code], 1))
     zero = torch.zeros([rows.size(0), 6], dtype=f.dtype, device=f.device)
     rest = self.stress_network(torch.cat([zero, rows], 1))
-    pressure = a[:, 0] * t + (a[:, 1] - rest[:, 1]) + a[:, 4] * D_trace / 3.0
+    e = self.strain_scale(rows)
+    b = self.sinh_of(a[:, 4])
+    volume = self.measure(t * e, self.exponent_of(a[:, 6]), self.exponent_of(a[:, 7]))
+    pressure = self.sinh_of(a[:, 0]) * volume / e + (a[:, 1] - rest[:, 1]) + b * D_trace / 3.0
+    half = (0.5 * self.exponent_of(a[:, 5])).unsqueeze(1)
+    eps = torch.log(torch.clamp(sigma, min=MINIMUM_STRETCH))
+    strain = self.measure(eps, half, half) * (self.sinh_of(a[:, 2]) / e).unsqueeze(1)
     w2 = w * w
     second = (w2 - w2.mean(1, keepdim=True)) / (1.0 + q).unsqueeze(1)
-    d = pressure.unsqueeze(1) + a[:, 2:3] * w + a[:, 3:4] * second
-    tau = torch.matmul(U * d.unsqueeze(1), U.transpose(1, 2)) + a[:, 4:5].unsqueeze(2) * D_dev
+    d = pressure.unsqueeze(1) + strain + a[:, 3:4] * second
+    tau = torch.matmul(U * d.unsqueeze(1), U.transpose(1, 2)) + b.unsqueeze(1).unsqueeze(2) * D_dev
     return (self.stress_scale(rows).unsqueeze(1).unsqueeze(2) * tau).to(F_proj.dtype)
 )";
 
@@ -241,7 +263,9 @@ std::string script_source(const kernels::LearnedLawWeights& weights, bool single
   text = replaced(text, "TIME_SCALE", literal(kernels::kTimeScale));
   text = replaced(text, "MINIMUM_STRETCH", literal(kernels::kMinimumStretch));
   text = replaced(text, "SMOOTHING", literal(kernels::kInvariantSmoothing));
-  text = replaced(text, "SLOPE_LIMIT", literal(kernels::kSlopeLimit));
+  text = replaced(text, "SINH_LIMIT", literal(kernels::kSinhLimit));
+  text = replaced(text, "EXPONENT_LIMIT", literal(kernels::kExponentLimit));
+  text = replaced(text, "ARGUMENT_LIMIT", literal(kernels::kArgumentLimit));
   text = replaced(text, "FLUID_CAP", literal(kernels::kFluidCap));
   text = replaced(text, "EPSILON2", literal(epsilon * epsilon));
   return replaced(text, "TINY", literal(tiny));

@@ -1,9 +1,28 @@
 #pragma once
 
+#include <algorithm>
+
 #include "ops/kernels/isotropic_law.hpp"
 
 namespace uniphy::kernels {
 inline namespace UNIPHY_ISA {
+
+/// The adjoint of network(). One that answers to z alone has the gradient of its outputs added to
+/// `sums` (may be null) instead, and none of its features.
+template <class T>
+void network_backward(const PackedMlp<T>& net, const T* constant, const T* in, T* tape,
+                      const T* grad_out, T* grad_in, T* first_bias, T* sums) {
+  using V = Lanes<T>;
+  if (!constant) return mlp_backward<T>(net, in, tape, grad_out, grad_in, first_bias, nullptr);
+  std::fill_n(grad_in, net.in() * kTile, T(0));
+  if (!sums) return;
+  for (int o = 0; o < net.out(); ++o) {
+    V sum(T(0));
+    for (std::ptrdiff_t l = 0; l < kTile; l += width_of<V>)
+      sum = sum + V::load_aligned(grad_out + o * kTile + l);
+    sums[o] += lane_sum(sum);
+  }
+}
 
 /// The adjoint of isotropic_evaluate, recomputing its forward pass tile by tile. Overwrites
 /// grad_F_trial, adds to grad_C and to the accumulator (LearnedLaw::Accumulator's layout); the last
@@ -41,29 +60,41 @@ inline void isotropic_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, Vi
     Gate<V> g;
     StressState<V> s;
     reload(l, U, sigma, strain, g, s);
-    const Coefficients<V> c = load_coefficients<V>(law, a, l);
+    const Coefficients<V> c = coefficients<V>(law, a + l);
+    const Measures<V> m = measures(s, c);
     const Mat3<V> gt = sym(load_mat3<V, T>(grad_tau, l, count - l, false)) * scale;
     const Mat3<V> S = tmul(U, mul(gt, U));
-    V g_a0 = zero, g_a1 = zero, g_a2 = zero;
+    V g_a0 = zero, g_a1 = zero, g_a2 = zero, g_n = zero;
     for (int i = 0; i < 3; ++i) {
       g_a0 = g_a0 + S(i, i);
-      g_a1 = fma(S(i, i), s.invariants.w[i], g_a1);
+      g_a1 = fma(S(i, i), m.strain[i].value * inv_e, g_a1);
       g_a2 = fma(S(i, i), s.second[i], g_a2);
+      g_n = fma(S(i, i), m.strain[i].per_gamma + m.strain[i].per_delta, g_n);
     }
-    const V g_k = g_a0 * s.volumetric;
+    const V g_k = g_a0 * m.volume.value * inv_e, g_volume = g_a0 * c.k.value * inv_e;
     const V g_b = dot(gt, s.rate) + g_a0 * s.rate_trace * third;
-    store_plane(tile.grad_stress, l, g_k);
+    const auto exponent = [&](int k, const V& g) {
+      store_plane(tile.grad_stress + k * kTile, l,
+                  exponent_gradient(V::load_aligned(a + k * kTile + l), g));
+    };
+    store_plane(tile.grad_stress, l, g_k * c.k.slope);
     store_plane(tile.grad_stress + kTile, l, g_a0);
-    store_plane(tile.grad_stress + 2 * kTile, l, g_a1);
+    store_plane(tile.grad_stress + 2 * kTile, l, g_a1 * c.a1.slope);
     store_plane(tile.grad_stress + 3 * kTile, l, g_a2);
-    store_plane(tile.grad_stress + 4 * kTile, l, g_b);
+    store_plane(tile.grad_stress + 4 * kTile, l, g_b * c.b.slope);
+    exponent(5, g_n * c.a1.value * inv_e * V(T(0.5)));
+    exponent(6, g_volume * m.volume.per_gamma);
+    exponent(7, g_volume * m.volume.per_delta);
     sum_rest = sum_rest + g_a0;
-    sum_log_s = sum_log_s + g_k * c.k + g_a0 * c.a0 + g_a1 * c.a1 + g_a2 * c.a2 + g_b * c.b;
+    const V of_measures = g_k * c.k.value + g_a1 * c.a1.value;  // both go as 1/e
+    sum_log_e = sum_log_e - of_measures;
+    sum_log_s = sum_log_s + of_measures + g_a0 * c.a0 + g_a2 * c.a2 + g_b * c.b.value;
   }
   T* const stress_bias = accumulator ? accumulator + law.projection.layer[0].out : nullptr;
   T* const feature = tile.grad_features;
-  mlp_backward<T>(law.stress, tile.stress_in, tile.stress_tape, tile.grad_stress, feature,
-                  stress_bias, nullptr);
+  network_backward(law.stress, law.constant_stress, tile.stress_in, tile.stress_tape,
+                   tile.grad_stress, feature, stress_bias,
+                   accumulator ? accumulator + law.coefficient_sums() : nullptr);
 
   // From the stress to the frame gradient of the projected F, and on to the gate.
   for (std::ptrdiff_t l = 0; l < kTile; l += w) {
@@ -74,7 +105,8 @@ inline void isotropic_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, Vi
     StressState<V> s;
     reload(l, U, sigma, strain, g, s);
     const Mat3<V> Vm = load_plane3<V>(tile.V, l);
-    const Coefficients<V> c = load_coefficients<V>(law, a, l);
+    const Coefficients<V> c = coefficients<V>(law, a + l);
+    const Measures<V> m = measures(s, c);
     V f[6];
     for (int k = 0; k < 6; ++k) f[k] = V::load_aligned(feature + k * kTile + l);
     const Mat3<V> gt = sym(load_mat3<V, T>(grad_tau, l, count - l, false)) * scale;
@@ -87,38 +119,44 @@ inline void isotropic_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, Vi
     const V g_rate_norm = f[4] - f[5] * s.x * v.q * inv_x;
     V g_q = f[1] - f[5] * s.x * s.rate_norm * inv_x;
 
-    // The diagonal: d_i = k t/e + a₀ + b tr(D)/3 + a₁ w_i + a₂ second_i, and the invariants of w.
+    // The diagonal: d_i = k m(t)/e + a₀ + b tr(D)/3 + a₁ m(ε_i)/e + a₂ second_i, and the
+    // invariants of w. gd is dL/dε̂, g_trace_p dL/dt.
     const V sum_S = S(0, 0) + S(1, 1) + S(2, 2), mean_S = sum_S * third;
-    const V g_volumetric = fma(sum_S, c.k, f[0]);
+    const V a1 = c.a1.value * inv_e;
+    V g_trace_p = fma(sum_S * c.k.value, m.volume.slope, f[0]) * inv_e;
     for (int i = 0; i < 3; ++i) g_q = g_q - S(i, i) * c.a2 * s.second[i] * s.spread;
     const V slope2 = two * c.a2 * s.spread;
     Vec3<V> gd;
-    V ge = -(g_volumetric * s.volumetric);  // dL/d(log e)
+    V ge = -(f[0] * s.volumetric);  // dL/d(log e) but for the measures', counted above
     for (int i = 0; i < 3; ++i) {
-      V gw = fma(c.a1, S(i, i), slope2 * v.w[i] * (S(i, i) - mean_S));
+      V gw = slope2 * v.w[i] * (S(i, i) - mean_S);
       gw =
           gw + g_aligned * s.rate_frame(i, i) + g_q * v.w[i] * v.inverse_root + f[2] * v.d_cubic[i];
       ge = ge - gw * v.w[i];
-      gd[i] = gw * inv_e;
+      const V of_strain = S(i, i) * a1 * m.strain[i].slope;  // dL/dε_i, ε_i = ε̂_i + t/3
+      gd[i] = fma(gw, inv_e, of_strain);
+      g_trace_p = fma(of_strain, third, g_trace_p);
     }
 
     Mat3<V> G;  // dL/d(U ε̂ Uᵀ) off the diagonal
     for (int k = 0; k < 3; ++k) {
       const int i = kPair[k][0], j = kPair[k][1];
-      const V t = S(i, j) * (c.a1 + c.a2 * (v.w[i] + v.w[j]) * s.spread);
-      G(i, j) = G(j, i) = fma(g_aligned, s.rate_frame(i, j), t) * inv_e;
+      const V of_w =
+          fma(S(i, j) * c.a2 * (v.w[i] + v.w[j]), s.spread, g_aligned * s.rate_frame(i, j));
+      const V of_strain = a1 * seth_hill_divided_difference(s.h.eps[i], s.h.eps[j], c.n);
+      G(i, j) = G(j, i) = fma(S(i, j), of_strain, of_w * inv_e);
     }
     // A fluid's F_proj is U Σ' Uᵀ = exp(t'/3) I.
     Mat3<V> A =
         tmul(U, mul(load_mat3<V, T>(grad_F_proj, l, count - l, false), select3(g.fluid, U, Vm)));
     const Vec3<V> sigma_p = projected_sigma<V, T>(g, sigma);
-    add_strain_gradient(s.h, gd, g_volumetric * inv_e, A);
+    add_strain_gradient(s.h, gd, g_trace_p, A);
     add_symmetric_adjoint(sigma_p, s.h.divided, G, A);
 
     if (grad_C) {
-      Mat3<V> gD =
-          compose(U, v.w, U) * g_aligned + gt * c.b + s.rate * (g_rate_norm * s.inverse_rate_root);
-      const V mean = trace(gD) * third, g_rate_trace = fma(sum_S * third, c.b, f[3]);
+      Mat3<V> gD = compose(U, v.w, U) * g_aligned + gt * c.b.value +
+                   s.rate * (g_rate_norm * s.inverse_rate_root);
+      const V mean = trace(gD) * third, g_rate_trace = fma(sum_S * third, c.b.value, f[3]);
       for (int k = 0; k < 9; k += 4) gD.e[k] = gD.e[k] - mean + g_rate_trace;
       store_mat3<V, T>(grad_C, l, count - l, gD * V(T(kTimeScale)), true);
     }
@@ -157,8 +195,9 @@ inline void isotropic_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, Vi
   }
 
   T* const invariant = tile.grad_invariants;
-  mlp_backward<T>(law.projection, tile.projection_in, tile.projection_tape, tile.grad_projection,
-                  invariant, accumulator, nullptr);
+  network_backward(law.projection, law.constant_projection, tile.projection_in,
+                   tile.projection_tape, tile.grad_projection, invariant, accumulator,
+                   accumulator ? accumulator + law.cap_sums() : nullptr);
   for (std::ptrdiff_t l = 0; l < kTile; l += w) {
     const Mat3<V> U = load_plane3<V>(tile.U, l), Vm = load_plane3<V>(tile.V, l);
     Vec3<V> sigma;
@@ -181,7 +220,7 @@ inline void isotropic_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, Vi
       store_mat3<V, T>(grad_F_trial, l, count - l, mult(mul(U, D), Vm));
   }
   if (accumulator) {
-    T* tail = accumulator + law.projection.layer[0].out + law.stress.layer[0].out;
+    T* tail = accumulator + law.scale_sums();
     tail[0] += lane_sum(sum_log_s);
     tail[1] += lane_sum(sum_log_e);
     tail[2] -= lane_sum(sum_rest);

@@ -5,6 +5,7 @@
 #include <new>
 #include <string>
 
+#include "ops/kernels/aligned_buffer.hpp"
 #include "ops/kernels/error.hpp"
 #include "ops/kernels/isa.hpp"
 
@@ -66,6 +67,15 @@ T* scratch_of_thread(std::ptrdiff_t size) {
   return buffer.data;
 }
 
+/// Whether the first `features` inputs of a network have no weight.
+bool ignores_state(const MlpWeights& network, int features) {
+  const MlpWeights::Layer& first = network.layers.front();
+  for (int o = 0; o < first.out; ++o)
+    for (int i = 0; i < features; ++i)
+      if (first.weight[std::size_t(o) * first.in + i] != 0) return false;
+  return true;
+}
+
 template <class T>
 class LearnedLawKernel final : public LawKernel<T> {
  public:
@@ -81,10 +91,19 @@ class LearnedLawKernel final : public LawKernel<T> {
             T(kStressScale * std::exp(kStressRate * z0)),
             T(kStrainScale * std::exp(kStrainRate * z1)),
             T(0),
-            T(0)};
+            T(0),
+            nullptr,
+            nullptr};
     if (law_.form == LawForm::isotropic) {
-      law_.rest_pressure = at_rest(law_.stress, 1);
-      law_.rest_cap = std::min(at_rest(law_.projection, 1), T(0));
+      const NetworkShape shape = network_shape(law_.form);
+      rest_projection_ = at_rest(law_.projection);
+      rest_stress_ = at_rest(law_.stress);
+      law_.rest_cap = std::min(rest_projection_[kTile], T(0));
+      law_.rest_pressure = rest_stress_[kTile];
+      if (ignores_state(d.weights->projection, shape.projection_in))
+        law_.constant_projection = rest_projection_.data();
+      if (ignores_state(d.weights->stress, shape.stress_in))
+        law_.constant_stress = rest_stress_.data();
     }
   }
 
@@ -94,16 +113,21 @@ class LearnedLawKernel final : public LawKernel<T> {
   void parameter_gradient(const T* accumulator, T* gradient) const override {
     const int projection_width = law_.projection.layer[0].out;
     const int stress_width = law_.stress.layer[0].out;
-    const T* tail = accumulator + projection_width + stress_width;
+    const T* tail = accumulator + law_.scale_sums();
     std::vector<double> z(latent_size_, 0.0);
     projection_.add_latent_gradient(accumulator, z);
     stress_.add_latent_gradient(accumulator + projection_width, z);
     if (law_.form == LawForm::isotropic) {
+      std::vector<T> outputs(accumulator + law_.coefficient_sums(),
+                             accumulator + law_.accumulator_size());
+      outputs[1] += tail[2];
       std::vector<T> bias(stress_width, T(0));
-      at_rest(law_.stress, 1, tail[2], bias.data());
+      at_rest(law_.stress, outputs.data(), bias.data());
       stress_.add_latent_gradient(bias.data(), z);
+      outputs.assign(accumulator + law_.cap_sums(), accumulator + law_.coefficient_sums());
+      if (law_.rest_cap < 0) outputs[1] += tail[3];
       bias.assign(projection_width, T(0));
-      if (law_.rest_cap < 0) at_rest(law_.projection, 1, tail[3], bias.data());
+      at_rest(law_.projection, outputs.data(), bias.data());
       projection_.add_latent_gradient(bias.data(), z);
       if (latent_size_ > 1) z[1] += kStrainRate * double(tail[1]);
     }
@@ -130,25 +154,28 @@ class LearnedLawKernel final : public LawKernel<T> {
   }
 
  private:
-  /// Output `row` of a network at rest, from the very kernel that the roll-out uses, so that what
-  /// is taken off is exact there. With `bias`, its gradient with respect to the folded first bias
-  /// is added, times `weight`.
-  T at_rest(const PackedMlp<T>& net, int row, T weight = T(0), T* bias = nullptr) const {
+  /// The outputs of a network at rest, [out, kTile], from the very kernel that the roll-out uses,
+  /// so that what is taken off is exact there. With `bias`, the gradient of the folded first bias
+  /// is added, given that of the outputs, `weight`.
+  AlignedBuffer<T> at_rest(const PackedMlp<T>& net, const T* weight = nullptr,
+                           T* bias = nullptr) const {
     const std::ptrdiff_t plane = std::ptrdiff_t(net.max_width) * kTile;
-    T* scratch = scratch_of_thread<T>(net.tape_scratch() + 3 * plane);
-    T *in = scratch, *out = in + plane, *grad = out + plane, *tape = grad + plane;
-    std::fill_n(in, 3 * plane, T(0));
-    table_.mlp_forward(net, in, out, tape);
+    T* scratch = scratch_of_thread<T>(net.tape_scratch() + 2 * plane);
+    T *in = scratch, *grad = in + plane, *tape = grad + plane;
+    std::fill_n(in, 2 * plane, T(0));
+    AlignedBuffer<T> out(padded(net.out()) * kTile);
+    table_.mlp_forward(net, in, out.data(), tape);
     if (bias) {
-      grad[row * kTile] = weight;  // one particle of the tile
+      for (int o = 0; o < net.out(); ++o) grad[o * kTile] = weight[o];  // one particle of the tile
       table_.mlp_backward(net, in, tape, grad, nullptr, bias, nullptr);
     }
-    return out[row * kTile];
+    return out;
   }
 
   std::ptrdiff_t latent_size_;
   const LearnedLawTable<T>& table_;
   PackedMlpStorage<T> projection_, stress_;
+  AlignedBuffer<T> rest_projection_, rest_stress_;
   LearnedLaw<T> law_{};
 };
 

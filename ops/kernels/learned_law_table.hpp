@@ -17,12 +17,17 @@ struct LearnedLaw {
   // a state without yield and without stress.
   T rest_pressure;  ///< a₀, in units of s
   T rest_cap;       ///< min(c₂, 0)
+  // The answers of networks whose state features have no weight, [out, kTile], or null.
+  const T* constant_projection;
+  const T* constant_stress;
 
   /// Layout of the running sum of an adjoint: gradients of the two folded first biases, then
-  /// dL/d(log s), dL/d(log e), dL/d(rest_pressure), dL/d(rest_cap).
-  std::ptrdiff_t accumulator_size() const {
-    return projection.layer[0].out + stress.layer[0].out + 4;
-  }
+  /// dL/d(log s), dL/d(log e), dL/d(rest_pressure), dL/d(rest_cap), then those of the outputs of
+  /// networks that answer to z alone.
+  std::ptrdiff_t scale_sums() const { return projection.layer[0].out + stress.layer[0].out; }
+  std::ptrdiff_t cap_sums() const { return scale_sums() + 4; }
+  std::ptrdiff_t coefficient_sums() const { return cap_sums() + projection.out(); }
+  std::ptrdiff_t accumulator_size() const { return coefficient_sums() + stress.out(); }
 };
 
 /// Where the sums of weight gradients of one layer go: [out, in, lanes] and [out, lanes].

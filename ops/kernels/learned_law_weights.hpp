@@ -38,7 +38,7 @@ struct NetworkShape {
   int projection_in, projection_out, stress_in, stress_out;
 };
 constexpr NetworkShape network_shape(LawForm form) {
-  return form == LawForm::isotropic ? NetworkShape{3, 4, 6, 5} : NetworkShape{30, 9, 25, 9};
+  return form == LawForm::isotropic ? NetworkShape{3, 4, 6, 8} : NetworkShape{30, 9, 25, 9};
 }
 
 /// The learned law without torch: what a model file holds. The first layers take the features of
@@ -67,7 +67,9 @@ inline constexpr double kStrainScale = 0.05;  ///< e = kStrainScale exp(kStrainR
 inline constexpr double kStrainRate = 2.0;
 inline constexpr double kTimeScale = 0.05;           ///< s, D = sym(C) kTimeScale
 inline constexpr double kInvariantSmoothing = 0.05;  ///< d: rounds the kink of the norms at 0
-inline constexpr double kSlopeLimit = 12;  ///< of m, whose sinh is the pressure slope of the cap
+inline constexpr double kSinhLimit = 12;             ///< of outputs whose sinh is a coefficient
+inline constexpr double kExponentLimit = 4;  ///< of outputs that are exponents of strain measures
+inline constexpr double kArgumentLimit = 30;  ///< of their |γ x| and |δ x|: float does not overflow
 inline constexpr double kFluidCap = -0.5;  ///< c₁ below which a material has no strength at all
 inline constexpr double kMinimumStretch =
     0.05;  ///< singular values are clamped here before the log

@@ -40,6 +40,33 @@ Tensor contract(const Tensor& a, const Tensor& b) { return (a * b).sum({1, 2}); 
 Tensor deviator(const Tensor& m) { return m - at_matrix(trace_of(m) / 3) * identity(m); }
 Tensor symmetric(const Tensor& m) { return 0.5 * (m + m.mT()); }
 
+Tensor sinh_of(const Tensor& x) {
+  return x.clamp(-kernels::kSinhLimit, kernels::kSinhLimit).sinh();
+}
+Tensor exponent_of(const Tensor& x) {
+  return x.clamp(-kernels::kExponentLimit, kernels::kExponentLimit);
+}
+
+/// t exp(δt) sinh(γt)/(γt), each [P].
+Tensor volume_measure(const Tensor& t, const Tensor& gamma, const Tensor& delta) {
+  const Tensor y = (gamma * t).clamp(-kernels::kArgumentLimit, kernels::kArgumentLimit);
+  const Tensor small = y.abs() < 1e-2, far = torch::where(small, torch::ones_like(y), y);
+  const Tensor y2 = y * y;
+  const Tensor series = 1 + y2 / 6 * (1 + y2 / 20 * (1 + y2 / 42 * (1 + y2 / 72)));
+  const Tensor ratio = torch::where(small, series, far.sinh() / far);
+  return t * (delta * t).clamp(-kernels::kArgumentLimit, kernels::kArgumentLimit).exp() * ratio;
+}
+
+/// (exp(n H) − I)/n, n [P].
+Tensor seth_hill_measure(const Tensor& H, const Tensor& n) {
+  const Tensor small = n.abs() < 1e-2, far = torch::where(small, torch::ones_like(n), n);
+  const Tensor X = at_matrix(n) * H;
+  Tensor series = identity(H) + X / 9;
+  for (int k = 8; k >= 2; --k) series = identity(H) + X.matmul(series) / k;
+  const Tensor whole = (symmetric_exp(at_matrix(far) * H) - identity(H)) / at_matrix(far);
+  return torch::where(at_matrix(small), H.matmul(series), whole);
+}
+
 /// Smooth invariants of w = ε̂/e.
 struct Invariants {
   Tensor W;      ///< dev H / e, [P, 3, 3]
@@ -153,7 +180,7 @@ IsotropicCaps isotropic_caps(const LearnedLawTensors& law, const Tensor& H, cons
   const Invariants v = invariants(H, strain_scale(z));
   const Tensor c = law.mlp(law.projection, law.activation, torch::stack({v.t, v.q, v.cubic}, 1), z);
   const Tensor rest = at_rest(law, law.projection, z).select(1, 1).clamp_max(0);
-  const Tensor slope = c.select(1, 2).clamp(-kernels::kSlopeLimit, kernels::kSlopeLimit).sinh();
+  const Tensor slope = sinh_of(c.select(1, 2));
   const Tensor mean_square = trace_of(symmetric_exp(2 * H)) / 3;
   IsotropicCaps caps;
   caps.c1 = c.select(1, 0) + slope * v.t;
@@ -172,11 +199,15 @@ Tensor isotropic_stress(const LearnedLawTensors& law, const Tensor& H, const Ten
   const Tensor f =
       law.mlp(law.stress, law.activation, torch::stack({v.t, v.q, v.cubic, D_trace, n, x}, 1), z);
   const Tensor rest = at_rest(law, law.stress, z).select(1, 1);
-  const auto coefficient = [&f](int k) { return f.select(1, k); };  // k, a₀, a₁, a₂, b
-  const Tensor pressure = coefficient(0) * v.t + (coefficient(1) - rest);
-  const Tensor in_units_of_s = at_matrix(pressure) * identity(H) + at_matrix(coefficient(2)) * v.W +
-                               at_matrix(coefficient(3) / (1 + v.q)) * deviator(v.W.matmul(v.W)) +
-                               at_matrix(coefficient(4)) * D;
+  const auto output = [&f](int k) { return f.select(1, k); };  // k̃, a₀, ã₁, a₂, b̃, n, γ, δ
+  const Tensor e = strain_scale(z);
+  const Tensor volume = volume_measure(trace_of(H), exponent_of(output(6)), exponent_of(output(7)));
+  const Tensor pressure = sinh_of(output(0)) * volume / e + (output(1) - rest);
+  const Tensor in_units_of_s =
+      at_matrix(pressure) * identity(H) +
+      at_matrix(sinh_of(output(2)) / e) * seth_hill_measure(H, exponent_of(output(5))) +
+      at_matrix(output(3) / (1 + v.q)) * deviator(v.W.matmul(v.W)) +
+      at_matrix(sinh_of(output(4))) * D;
   return at_matrix(stress_scale(z)) * in_units_of_s;
 }
 

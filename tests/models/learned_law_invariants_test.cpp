@@ -51,8 +51,8 @@ LearnedLawWeights hencky_solid(double mu, double lambda, double c1, double c2, d
   w.form = LawForm::isotropic;
   w.latent_size = 2;  // z = 0: the scales are their constants
   w.projection = linear(3 + 2, {c1, c2, std::asinh(slope), rate});
-  const double bulk = lambda + 2.0 / 3.0 * mu;
-  w.stress = linear(6 + 2, {bulk * strain_over_stress, 0, 2 * mu * strain_over_stress, 0, 0});
+  w.stress = linear(6 + 2, {std::asinh(lambda * strain_over_stress), 0,
+                            std::asinh(2 * mu * strain_over_stress), 0, 0, 0, 0, 0});
   return w;
 }
 
@@ -158,14 +158,35 @@ TEST(LearnedLaw, WithACapAndARateIsNonNewtonian) {
   EXPECT_LE(largest.stress, 1e-11);
 }
 
-TEST(LearnedLaw, WithoutStrengthProjectsLikeAFluid) {
-  const auto learned =
-      kernels::make_law<double>(described(hencky_solid(1e5, 2e5, -1, 1e6), {0, 0}));
+TEST(LearnedLaw, WithGreensMeasureIsNeoHookean) {
+  const double mu = 1e5, lambda = 2e5;
+  auto weights = hencky_solid(mu, lambda, 1e6, 1e6);
+  weights.stress.layers[0].bias[5] = 2;
+  LawDescription d;
+  d.id = LawId::elastic;
+  d.mu = mu;
+  d.lambda = lambda;
+  const Largest largest = difference(*kernels::make_law<double>(described(weights, {0, 0})),
+                                     *kernels::make_law<double>(d));
+  EXPECT_EQ(largest.projection, 0);
+  EXPECT_LE(largest.stress, 1e-11);
+}
+
+TEST(LearnedLaw, WithTheLiquidsExponentsIsNewtonian) {
+  const double mu = 300, lambda = 1e4, kappa = 2.0 / 3 * mu + lambda;
+  auto weights = hencky_solid(0, 7 * kappa, -1, 1e6);
+  auto& outputs = weights.stress.layers[0].bias;
+  outputs[4] = std::asinh(mu / (kernels::kStressScale * kernels::kTimeScale));
+  outputs[6] = 3.5;
+  outputs[7] = -2.5;
   LawDescription d;
   d.id = LawId::newtonian;
-  d.mu = 100;
-  d.lambda = 1e4;
-  EXPECT_LE(difference(*learned, *kernels::make_law<double>(d)).projection, 1e-13);
+  d.mu = mu;
+  d.lambda = lambda;
+  const Largest largest = difference(*kernels::make_law<double>(described(weights, {0, 0})),
+                                     *kernels::make_law<double>(d));
+  EXPECT_LE(largest.projection, 1e-13);
+  EXPECT_LE(largest.stress, 1e-10);
 }
 
 }  // namespace

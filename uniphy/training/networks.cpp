@@ -60,12 +60,16 @@ Networks Networks::random(const NetworkOptions& options, torch::Generator& gener
   Networks n;
   n.options = options;
   n.projection = random_mlp(shape.projection_in, shape.projection_out, options, generator);
+  n.stress = random_mlp(shape.stress_in, shape.stress_out, options, generator);
   if (options.form == kernels::LawForm::isotropic) {
     torch::NoGradGuard no_grad;
     n.projection.back().bias[3].fill_(kInitialRate);
     if (!options.state_caps) n.projection.front().weight.narrow(1, 0, shape.projection_in).zero_();
+    if (!options.state_moduli) n.stress.front().weight.narrow(1, 0, shape.stress_in).zero_();
+    // Between the materials' exponents, and off γ = 0, where the derivative to γ vanishes.
+    n.stress.back().bias[5].fill_(1);
+    n.stress.back().bias[6].fill_(1);
   }
-  n.stress = random_mlp(shape.stress_in, shape.stress_out, options, generator);
   return n;
 }
 

@@ -17,7 +17,9 @@ struct NetworkOptions {
   std::int64_t latent_size = 8;
   std::int64_t hidden_layers = 3;
   std::int64_t width = 32;
-  bool state_caps = true;  ///< isotropic form: the caps answer to the state, or to z alone
+  // Isotropic form: whether the caps and the moduli answer to the state, or to z alone.
+  bool state_caps = true;
+  bool state_moduli = true;
 };
 
 /// The two networks as leaf tensors (float32) that an optimizer moves.

@@ -19,6 +19,25 @@ Tensor network(const std::vector<ops::LinearLayer>& layers, const Networks& netw
 Tensor columns(const Tensor& batch, int first, int count) { return batch.narrow(2, first, count); }
 Tensor column(const Tensor& batch, int index) { return batch.select(2, index); }
 
+Tensor sinh_of(const Tensor& x) {
+  return torch::sinh(x.clamp(-kernels::kSinhLimit, kernels::kSinhLimit));
+}
+Tensor exponent_of(const Tensor& x) {
+  return x.clamp(-kernels::kExponentLimit, kernels::kExponentLimit);
+}
+Tensor argument_of(const Tensor& x) {
+  return x.clamp(-kernels::kArgumentLimit, kernels::kArgumentLimit);
+}
+
+/// x exp(δx) sinh(γx)/(γx), the measures of ops/kernels/strain_measure.hpp.
+Tensor strain_measure(const Tensor& x, const Tensor& gamma, const Tensor& delta) {
+  const Tensor y = argument_of(gamma * x), small = y.abs() < 0.1;
+  const Tensor far = torch::where(small, torch::ones_like(y), y), y2 = y * y;
+  const Tensor ratio =
+      torch::where(small, 1.0 + y2 / 6.0 * (1.0 + y2 / 20.0), torch::sinh(far) / far);
+  return x * torch::exp(argument_of(delta * x)) * ratio;
+}
+
 /// The least weight of a cap that is missed where the law does not cut.
 constexpr double kLeastShare = 0.05;
 
@@ -73,8 +92,7 @@ LawErrors Objective::isotropic(const Networks& networks, const Tensor& z, const 
                        ? network(networks.projection, networks,
                                  torch::stack({trace * inv_e, trial.q, trial.cubic}, 2), z)
                        : c_rest;
-  const Tensor slope =
-      torch::sinh(c.select(2, 2).clamp(-kernels::kSlopeLimit, kernels::kSlopeLimit));
+  const Tensor slope = sinh_of(c.select(2, 2));
   const Tensor c1 = c.select(2, 0) + slope * trace * inv_e;
   const Tensor cap_q = e1 * c1;
   const Tensor cap_t = e1 * (c.select(2, 1) - c_rest.select(2, 1).clamp_max(0.0));
@@ -126,17 +144,27 @@ LawErrors Objective::isotropic(const Networks& networks, const Tensor& z, const 
   const Tensor rate_norm =
       torch::sqrt(square(deviatoric).sum(2) + 2.0 * square(off).sum(2) + d * d) - d;
   const Tensor x = (w * deviatoric).sum(2) / (1.0 + rate_norm * strain.q);
-  const Tensor a =
-      network(networks.stress, networks,
-              torch::stack({volumetric, strain.q, strain.cubic, rate_trace, rate_norm, x}, 2), z);
   const Tensor a_rest = network(networks.stress, networks, torch::zeros({n, 1, 6}), z);
-  const Tensor b = a.select(2, 4);
-  const Tensor pressure =
-      a.select(2, 0) * volumetric + a.select(2, 1) - a_rest.select(2, 1) + b * rate_trace / 3.0;
+  const Tensor a =
+      networks.options.state_moduli
+          ? network(networks.stress, networks,
+                    torch::stack({volumetric, strain.q, strain.cubic, rate_trace, rate_norm, x}, 2),
+                    z)
+          : a_rest;
+  const Tensor b = sinh_of(a.select(2, 4));
+  const Tensor volume =
+      strain_measure(projected_trace, exponent_of(a.select(2, 6)), exponent_of(a.select(2, 7)));
+  const Tensor pressure = sinh_of(a.select(2, 0)) * volume * inv_e + a.select(2, 1) -
+                          a_rest.select(2, 1) + b * rate_trace / 3.0;
+  const Tensor half = 0.5 * exponent_of(a.narrow(2, 5, 1));
+  const Tensor eps =
+      columns(batch, Column::projected_deviator, 3) + projected_trace.unsqueeze(2) / 3.0;
+  const Tensor principal =
+      strain_measure(eps, half, half) * (sinh_of(a.select(2, 2)) * inv_e).unsqueeze(2);
   const Tensor w2 = square(w);
   const Tensor second = (w2 - w2.mean(2, true)) / (1.0 + strain.q).unsqueeze(2);
-  const Tensor tau_diagonal = pressure.unsqueeze(2) + a.narrow(2, 2, 1) * w +
-                              a.narrow(2, 3, 1) * second + b.unsqueeze(2) * deviatoric;
+  const Tensor tau_diagonal =
+      pressure.unsqueeze(2) + principal + a.narrow(2, 3, 1) * second + b.unsqueeze(2) * deviatoric;
   const Tensor tau = columns(batch, Column::stress, 6);
   const Tensor s2 = s.unsqueeze(1).unsqueeze(2);
   const Tensor error2 = square(s2 * tau_diagonal - tau.narrow(2, 0, 3)).sum(2) +

@@ -34,9 +34,13 @@ TrainStageOptions read(Section& config) {
   network.latent_size =
       model.integer("latent_size", 8, between(1, 256), "", "numbers in a latent code");
   network.hidden_layers = model.integer("hidden_layers", 3, between(0, 16), "", "of each network");
-  network.state_caps = model.choice("caps", "state", {"state", "constant"},
-                                    "of the isotropic form: functions of the state and z, or of z "
-                                    "alone") == "state";
+  const auto answers_to = [&model](const char* key, const char* what) {
+    return model.choice(key, "constant", {"state", "constant"},
+                        std::string("of the isotropic form: ") + what +
+                            " as functions of the state and z, or of z alone") == "state";
+  };
+  network.state_caps = answers_to("caps", "the caps of the projection");
+  network.state_moduli = answers_to("moduli", "the moduli of the stress");
   network.width = model.integer("width", 32, between(1, 1024), "", "of each hidden layer");
 
   Section t = config.section("training", "AdamW on all trajectories at once");

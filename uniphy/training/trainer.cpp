@@ -15,7 +15,7 @@ namespace {
 using torch::Tensor;
 
 constexpr std::int64_t kReportEvery = 100;
-constexpr double kCapsFirst = 0.3;  ///< share of the steps with Objective::errors' whole_way
+constexpr double kCapsFirst = 0.6;  ///< share of the steps with Objective::errors' whole_way
 
 /// z before training. The scale coordinates start at the trajectory's own stress and strain, so
 /// that both networks see numbers near one from the first step; the others start small.

@@ -29,13 +29,14 @@ std::string fingerprint(const Dataset& data, const TrainingOptions& o) {
   hash.add(data.samples.tau);
   hash.add(data.first.data(), data.first.size() * sizeof(data.first[0]));
   return fmt::format(
-      "{} {} caps {} latent {} layers {} width {} seed {} steps {} batch {} rate {} x {} decay {} "
+      "{} {} caps {} moduli {} latent {} layers {} width {} seed {} steps {} batch {} rate {} x {} "
+      "decay {} "
       "sigma {} "
       "floor {} delta {} clip {} data {:016x}",
       kernels::form_name(o.network.form), kernels::activation_name(o.network.activation),
-      o.network.state_caps, o.network.latent_size, o.network.hidden_layers, o.network.width, o.seed,
-      o.steps, o.batch_per_trajectory, o.learning_rate, o.latent_rate, o.weight_decay,
-      o.latent_sigma, o.error_floor, o.delta, o.clip, hash.value());
+      o.network.state_caps, o.network.state_moduli, o.network.latent_size, o.network.hidden_layers,
+      o.network.width, o.seed, o.steps, o.batch_per_trajectory, o.learning_rate, o.latent_rate,
+      o.weight_decay, o.latent_sigma, o.error_floor, o.delta, o.clip, hash.value());
 }
 
 }  // namespace

@@ -82,7 +82,7 @@ inline ModelFile readable_model(int codes = 8) {
   auto caps = layer(shape.projection_in, {1.5, 100, 0, 30});  // c₀, c₂ in units of the strain scale
   caps.weight[shape.projection_in + 2] = 2;
   w.projection.layers = {caps};
-  auto stress = layer(shape.stress_in, {3, 0, 2, 0, 0.2});
+  auto stress = layer(shape.stress_in, {1.5, 0, 1.4, 0, 0.2, 0, 0, 0});
   stress.weight[2 * stress.in + shape.stress_in + 3] = 1;
   w.stress.layers = {stress};
   std::mt19937 random(3);
