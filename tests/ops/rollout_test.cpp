@@ -93,10 +93,17 @@ std::vector<Material> materials() {
     LawDescription law;
     law.id = LawId::learned;
     auto weights = testing::random_weights(form, 6, 16, 2, kernels::Activation::gelu, 5, 0.5);
-    // Untrained, the seed form adds noise to F in every step: keep it small enough to fly.
+    // Untrained, the seed form adds noise to F in every step: keep it small enough to fly; and the
+    // isotropic form switches between solid and fluid where it stands: make it yield early instead.
     kernels::MlpWeights::Layer& last = weights.projection.layers.back();
-    for (double& w : last.weight) w *= form == kernels::LawForm::seed ? 1e-3 : 1;
-    for (double& b : last.bias) b *= form == kernels::LawForm::seed ? 1e-3 : 1;
+    const bool seed = form == kernels::LawForm::seed;
+    for (double& w : last.weight) w *= seed ? 1e-3 : 0.1;
+    if (seed)
+      for (double& b : last.bias) b *= 1e-3;
+    else {
+      last.bias = {0.5, 5, 0.3, 0.5};
+      weights.stress.layers.back().bias = {2, 0, 2, 0, 0.2, 1, 1, 0};  // stiff: z shows
+    }
     law.weights = std::make_shared<kernels::LearnedLawWeights>(weights);
     torch::manual_seed(11);
     all.push_back({kernels::form_name(form), law, 0.3 * torch::randn({6}, torch::kFloat64)});
@@ -133,6 +140,9 @@ TEST_P(RolloutOfMaterial, GradientsAgreeWithCentralDifferences) {
   }
   EXPECT_LE(relative_error(found, expected), 1e-6) << "v";
 
+  const bool learned = m.law.id == LawId::learned;
+  found.clear();
+  expected.clear();
   for (std::int64_t k = 0; k < m.parameters.size(0); ++k) {
     const double at = m.parameters[k].item<double>();
     const auto value = [&](const std::vector<double>& p) {
@@ -140,11 +150,13 @@ TEST_P(RolloutOfMaterial, GradientsAgreeWithCentralDifferences) {
       moved[k] = p[0];
       return loss_of(scene.run(m.law, moved).x).item<double>();
     };
-    const double step = 1e-3 * (m.law.id == LawId::learned ? 1 : at);
-    const auto difference = central_differences(value, {at}, {step});
-    EXPECT_NE(difference[0], 0);
-    EXPECT_LE(relative_error({grad_p[k].item<double>()}, difference), 1e-6) << "parameter " << k;
+    found.push_back(grad_p[k].item<double>());
+    expected.push_back(central_differences(value, {at}, {1e-3 * (learned ? 1 : at)})[0]);
+    EXPECT_NE(expected.back(), 0);
+    if (!learned) EXPECT_LE(relative_error({found.back()}, {expected.back()}), 1e-6) << k;
   }
+  // z as a whole: some of its coordinates hardly move an untrained law.
+  if (learned) EXPECT_LE(relative_error(found, expected), 1e-6) << "z";
 }
 INSTANTIATE_TEST_SUITE_P(, RolloutOfMaterial, ::testing::Range(0, 9),
                          [](const auto& info) { return materials()[info.param].name; });
