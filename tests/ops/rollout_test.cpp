@@ -153,10 +153,14 @@ TEST_P(RolloutOfMaterial, GradientsAgreeWithCentralDifferences) {
     found.push_back(grad_p[k].item<double>());
     expected.push_back(central_differences(value, {at}, {1e-3 * (learned ? 1 : at)})[0]);
     EXPECT_NE(expected.back(), 0);
-    if (!learned) EXPECT_LE(relative_error({found.back()}, {expected.back()}), 1e-6) << k;
+    if (!learned) {
+      EXPECT_LE(relative_error({found.back()}, {expected.back()}), 1e-6) << "parameter " << k;
+    }
   }
   // z as a whole: some of its coordinates hardly move an untrained law.
-  if (learned) EXPECT_LE(relative_error(found, expected), 1e-6) << "z";
+  if (learned) {
+    EXPECT_LE(relative_error(found, expected), 1e-6) << "z";
+  }
 }
 INSTANTIATE_TEST_SUITE_P(, RolloutOfMaterial, ::testing::Range(0, 9),
                          [](const auto& info) { return materials()[info.param].name; });
