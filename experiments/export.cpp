@@ -55,11 +55,13 @@ int main(int argc, char** argv) {
   const uniphy::ExperimentInfo info{
       "uniphy_export",
       "Writes a trained model as a TorchScript file that runs without this project, and its "
-      "weights "
-      "and latent codes in the documented HDF5 layout; then loads both and checks the answers.",
-      {"model: a model of uniphy_train (HDF5)"},
-      {"law.pt: TorchScript with project(F, z) and stress(F_proj, C, z) (models/torchscript.hpp)",
-       "weights.h5: the same numbers (uniphy/io/model_file.hpp)"},
+      "weights and latent codes in the documented HDF5 layout; then loads both and checks the "
+      "answers.",
+      {"CONFIG.yaml         the model and the dtype",
+       "model.h5            a model of uniphy_train (layout: uniphy/io/model_file.hpp)"},
+      {"DIR/law.pt          TorchScript with project(F, z) and stress(F_proj, C, z) (layout: "
+       "models/torchscript.hpp)",
+       "DIR/weights.h5      the same numbers (layout: uniphy/io/model_file.hpp)"},
       {"uniphy_export configs/export/unified.yaml --set dtype=float32 --out out/export"}};
   return uniphy::run_experiment(
       argc, argv, info, [](uniphy::Section& config) -> uniphy::RunFunction {

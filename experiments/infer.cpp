@@ -44,13 +44,17 @@ int main(int argc, char** argv) {
       "by gradients through the whole simulation. An interrupted run goes on where it was.",
       {"CONFIG.yaml         the observation, what is fitted, the schedule",
        "observation.h5      positions, times and the scene, nothing about the material (layout: "
-       "uniphy/io/observation.hpp)",
+       "uniphy/io/observation.hpp; uniphy_simulate writes one with output.observation=true)",
        "model.h5            a trained model (layout: uniphy/io/model_file.hpp)"},
       {"DIR/latent.h5       the fitted material (layout: uniphy/io/latent_file.hpp)",
        "DIR/trajectory.h5   its roll-out at the observed frames, trajectory.xdmf for ParaView",
        "DIR/loss.png        loss of every candidate", "DIR/frames.png      observed and fitted",
        "DIR/state.h5        while it runs: where it can be taken up again"},
-      {"uniphy_infer configs/infer/latent.yaml --set "
+      {"uniphy_simulate configs/simulate/benchmark_cube.yaml --set output.observation=true --set "
+       "scene.steps=400 --out out/cube",
+       "uniphy_infer configs/infer/latent.yaml --set observation=out/cube/observation.h5 --out "
+       "out/infer/cube",
+       "uniphy_infer configs/infer/latent.yaml --set "
        "observation=out/identify/identify/sand/observation.h5 --out out/infer/sand",
        "uniphy_infer configs/infer/elastic.yaml"}};
   return uniphy::run_experiment(

@@ -12,7 +12,8 @@ int main(int argc, char** argv) {
        "meshes (OBJ), particles (HDF5 or text), models (model.h5) and latents that it names"},
       {"DIR/trajectory.h5   positions in every frame, the last state (layout: "
        "uniphy/io/trajectory.hpp)",
-       "DIR/trajectory.xdmf opens it in ParaView", "DIR/frames.png      a strip of pictures"},
+       "DIR/trajectory.xdmf opens it in ParaView", "DIR/frames.png      a strip of pictures",
+       "DIR/observation.h5  with output.observation=true, what uniphy_infer may see of it"},
       {"uniphy_simulate configs/simulate/benchmark_cube.yaml --out out/cube",
        "uniphy_simulate configs/simulate/benchmark_cube.yaml --set bodies.0.law.mu=5e5 "
        "--set scene.dt=auto"}};

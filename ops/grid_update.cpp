@@ -3,6 +3,7 @@
 #include <torch/torch.h>
 
 #include "ops/kernels/transfers.hpp"
+#include "ops/saved_grid.hpp"
 #include "ops/tensor_check.hpp"
 
 namespace uniphy::ops {
@@ -13,23 +14,18 @@ using torch::autograd::variable_list;
 
 namespace {
 
-struct Settings : torch::CustomClassHolder {
-  explicit Settings(const kernels::GridSettings& s) : grid(s) {}
-  kernels::GridSettings grid;
-};
-
 class GridUpdateFunction : public torch::autograd::Function<GridUpdateFunction> {
  public:
   static Tensor forward(AutogradContext* ctx, const Tensor& grid,
-                        const c10::intrusive_ptr<Settings>& settings) {
-    const std::int64_t n = settings->grid.n;
+                        const kernels::GridSettings& settings) {
+    const std::int64_t n = settings.n;
     const Tensor velocity = torch::empty({n, n, n, 3}, grid.options());
     for_real_type(grid.scalar_type(), [&](auto real) {
       using T = decltype(real);
-      kernels::grid_update<T>(settings->grid, grid.data_ptr<T>(), velocity.data_ptr<T>());
+      kernels::grid_update<T>(settings, grid.data_ptr<T>(), velocity.data_ptr<T>());
     });
     ctx->save_for_backward({grid, velocity});
-    ctx->saved_data["settings"] = torch::IValue::make_capsule(settings);
+    save_grid(ctx, settings);
     ctx->set_materialize_grads(false);
     return velocity;
   }
@@ -37,14 +33,12 @@ class GridUpdateFunction : public torch::autograd::Function<GridUpdateFunction> 
   static variable_list backward(AutogradContext* ctx, variable_list grad_out) {
     if (!grad_out[0].defined()) return {Tensor(), Tensor()};
     const variable_list saved = ctx->get_saved_variables();
-    const auto settings =
-        c10::static_intrusive_pointer_cast<Settings>(ctx->saved_data["settings"].toCapsule());
+    const kernels::GridSettings settings = saved_grid(ctx);
     const Tensor grad = torch::empty_like(saved[0]);
     for_real_type(grad.scalar_type(), [&](auto real) {
       using T = decltype(real);
-      kernels::grid_update_adjoint<T>(settings->grid, saved[0].data_ptr<T>(),
-                                      saved[1].data_ptr<T>(), gradient_data<T>(grad_out[0]),
-                                      grad.data_ptr<T>());
+      kernels::grid_update_adjoint<T>(settings, saved[0].data_ptr<T>(), saved[1].data_ptr<T>(),
+                                      gradient_data<T>(grad_out[0]), grad.data_ptr<T>());
     });
     return {grad, Tensor()};
   }
@@ -56,7 +50,7 @@ Tensor grid_update(const Tensor& grid, const kernels::GridSettings& settings) {
   const std::int64_t n = settings.n;
   const auto type = real_type("grid_update", "grid", grid);
   return GridUpdateFunction::apply(checked("grid_update", "grid", grid, type, {n, n, n, 4}),
-                                   c10::make_intrusive<Settings>(settings));
+                                   settings);
 }
 
 }  // namespace uniphy::ops

@@ -3,6 +3,7 @@
 #include <torch/torch.h>
 
 #include "ops/kernels/transfers.hpp"
+#include "ops/saved_grid.hpp"
 #include "ops/tensor_check.hpp"
 
 namespace uniphy::ops {
@@ -12,11 +13,6 @@ using torch::autograd::AutogradContext;
 using torch::autograd::variable_list;
 
 namespace {
-
-struct Settings : torch::CustomClassHolder {
-  explicit Settings(const kernels::GridSettings& s) : grid(s) {}
-  kernels::GridSettings grid;
-};
 
 template <class T>
 kernels::ParticleArrays<T> arrays(const variable_list& p) {
@@ -28,16 +24,16 @@ class P2gFunction : public torch::autograd::Function<P2gFunction> {
  public:
   static Tensor forward(AutogradContext* ctx, const Tensor& x, const Tensor& v, const Tensor& C,
                         const Tensor& tau, const Tensor& mass, const Tensor& volume,
-                        const c10::intrusive_ptr<Settings>& settings) {
+                        const kernels::GridSettings& settings) {
     const variable_list inputs{x, v, C, tau, mass, volume};
-    const std::int64_t n = settings->grid.n;
+    const std::int64_t n = settings.n;
     const Tensor grid = torch::empty({n, n, n, 4}, x.options());
     for_real_type(x.scalar_type(), [&](auto real) {
       using T = decltype(real);
-      kernels::p2g<T>(settings->grid, arrays<T>(inputs), grid.data_ptr<T>());
+      kernels::p2g<T>(settings, arrays<T>(inputs), grid.data_ptr<T>());
     });
     ctx->save_for_backward(inputs);
-    ctx->saved_data["settings"] = torch::IValue::make_capsule(settings);
+    save_grid(ctx, settings);
     ctx->set_materialize_grads(false);
     return grid;
   }
@@ -46,15 +42,14 @@ class P2gFunction : public torch::autograd::Function<P2gFunction> {
     variable_list grad(7);
     if (!grad_out[0].defined()) return grad;
     const variable_list inputs = ctx->get_saved_variables();
-    const auto settings =
-        c10::static_intrusive_pointer_cast<Settings>(ctx->saved_data["settings"].toCapsule());
+    const kernels::GridSettings settings = saved_grid(ctx);
     for (int i = 0; i < 6; ++i) {
       if (ctx->needs_input_grad(i)) grad[i] = torch::empty_like(inputs[i]);
     }
     for_real_type(inputs[0].scalar_type(), [&](auto real) {
       using T = decltype(real);
       const auto to = [&](int i) { return grad[i].defined() ? grad[i].data_ptr<T>() : nullptr; };
-      kernels::p2g_adjoint<T>(settings->grid, arrays<T>(inputs), gradient_data<T>(grad_out[0]),
+      kernels::p2g_adjoint<T>(settings, arrays<T>(inputs), gradient_data<T>(grad_out[0]),
                               {to(0), to(1), to(2), to(3), to(4), to(5)});
     });
     return grad;
@@ -71,7 +66,7 @@ Tensor p2g(const Tensor& x, const Tensor& v, const Tensor& C, const Tensor& tau,
   return P2gFunction::apply(
       positions, checked("p2g", "v", v, type, {P, 3}), checked("p2g", "C", C, type, {P, 3, 3}),
       checked("p2g", "tau", tau, type, {P, 3, 3}), checked("p2g", "mass", mass, type, {P}),
-      checked("p2g", "volume", volume, type, {P}), c10::make_intrusive<Settings>(settings));
+      checked("p2g", "volume", volume, type, {P}), settings);
 }
 
 }  // namespace uniphy::ops

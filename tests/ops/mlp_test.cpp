@@ -7,44 +7,27 @@
 #include <torch/torch.h>
 
 #include "ops/kernels/error.hpp"
+#include "tests/support/network_cases.hpp"
 
 namespace uniphy::ops {
 namespace {
 
+using testing::network_layers;
+using testing::network_leaves;
 using torch::Tensor;
-
-std::vector<LinearLayer> layers(std::vector<std::int64_t> widths, torch::Dtype type) {
-  torch::manual_seed(4);
-  std::vector<LinearLayer> result;
-  for (std::size_t k = 0; k + 1 < widths.size(); ++k)
-    result.push_back(
-        {(torch::randn({widths[k + 1], widths[k]}, type) / std::sqrt(double(widths[k])))
-             .requires_grad_(),
-         torch::randn({widths[k + 1]}, type).requires_grad_()});
-  return result;
-}
-
-std::vector<Tensor> leaves(const Tensor& x, const std::vector<LinearLayer>& l) {
-  std::vector<Tensor> all{x};
-  for (const LinearLayer& layer : l) {
-    all.push_back(layer.weight);
-    all.push_back(layer.bias);
-  }
-  return all;
-}
 
 class MlpTest : public ::testing::TestWithParam<kernels::Activation> {};
 
 TEST_P(MlpTest, ValueAndGradientsMatchPlainTensors) {
   for (const auto& widths : {std::vector<std::int64_t>{11, 20, 33, 5}, {7, 2}, {3, 128, 1}}) {
     for (const std::int64_t samples : {1, 64, 700}) {
-      const auto l = layers(widths, torch::kFloat64);
+      const auto l = network_layers(widths, torch::kFloat64);
       const Tensor x = torch::randn({samples, widths.front()}, torch::kFloat64).requires_grad_();
       const Tensor seed = torch::randn({samples, widths.back()}, torch::kFloat64);
       const Tensor y = mlp(x, l, GetParam()), expected = mlp_reference(x, l, GetParam());
       EXPECT_LE((y - expected).abs().max().item<double>(), 1e-12);
-      const auto got = torch::autograd::grad({y}, leaves(x, l), {seed});
-      const auto want = torch::autograd::grad({expected}, leaves(x, l), {seed});
+      const auto got = torch::autograd::grad({y}, network_leaves(x, l), {seed});
+      const auto want = torch::autograd::grad({expected}, network_leaves(x, l), {seed});
       for (std::size_t k = 0; k < got.size(); ++k) {
         EXPECT_GT(want[k].norm().item<double>(), 0);
         EXPECT_LE(((got[k] - want[k]).norm() / want[k].norm()).item<double>(), 1e-12) << k;
@@ -53,15 +36,22 @@ TEST_P(MlpTest, ValueAndGradientsMatchPlainTensors) {
   }
 }
 
+TEST_P(MlpTest, GradientsAgreeWithCentralDifferences) {
+  const testing::NetworkErrors errors = testing::network_errors(GetParam());
+  EXPECT_LE(errors.x, 1e-8);
+  EXPECT_LE(errors.weights, 1e-8);
+  EXPECT_LE(errors.biases, 1e-8);
+}
+
 TEST_P(MlpTest, SameBitsOnOneThreadAndTwo) {
-  const auto l = layers({11, 32, 32, 5}, torch::kFloat32);
+  const auto l = network_layers({11, 32, 32, 5}, torch::kFloat32);
   const Tensor x = torch::randn({3001, 11}).requires_grad_();
   std::vector<std::vector<Tensor>> results;
   const int threads = at::get_num_threads();
   for (const int n : {1, 2}) {
     at::set_num_threads(n);
     const Tensor y = mlp(x, l, GetParam());
-    results.push_back(torch::autograd::grad({y}, leaves(x, l), {torch::ones_like(y)}));
+    results.push_back(torch::autograd::grad({y}, network_leaves(x, l), {torch::ones_like(y)}));
     results.back().push_back(y.detach());
   }
   at::set_num_threads(threads);
@@ -75,7 +65,7 @@ INSTANTIATE_TEST_SUITE_P(Activations, MlpTest,
                          [](const auto& info) { return kernels::activation_name(info.param); });
 
 TEST(Mlp, RefusesWhatDoesNotFit) {
-  const auto l = layers({4, 8, 2}, torch::kFloat32);
+  const auto l = network_layers({4, 8, 2}, torch::kFloat32);
   try {
     mlp(torch::zeros({3, 5}), l, kernels::Activation::silu);
     FAIL();
@@ -89,7 +79,7 @@ TEST(Mlp, RefusesWhatDoesNotFit) {
 }
 
 TEST(Mlp, UndefinedGradientsStayUndefined) {
-  const auto l = layers({4, 8, 2}, torch::kFloat32);
+  const auto l = network_layers({4, 8, 2}, torch::kFloat32);
   const Tensor x = torch::randn({3, 4});  // no gradient asked for
   mlp(x, l, kernels::Activation::silu).sum().backward();
   EXPECT_FALSE(x.grad().defined());

@@ -113,16 +113,13 @@ Motion draw_motion(const GenerateOptions& o, const LawDescription& law, double d
 /// move along. `wall` (m) is how thick the walls are.
 Vector3d place(const BodyDescription& body, const Motion& m, double wall) {
   const BodyParticles particles = place_body(body);
-  Vector3d first = particles.x.front(), last = first, centre;
-  for (const Vector3d& x : particles.x) {
-    first = first.cwiseMin(x);
-    last = last.cwiseMax(x);
-  }
+  const Bounds bounds = bounds_of(particles.x);
+  Vector3d centre;
   const double margin = 0.5 * std::cbrt(particles.volume.front());
   const double lead = m.direction.cwiseAbs().maxCoeff();
   for (int axis = 0; axis < 3; ++axis) {
-    const double least = wall + margin - first[axis];
-    const double most = std::max(least, 1 - wall - margin - last[axis]);
+    const double least = wall + margin - bounds.min[axis];
+    const double most = std::max(least, 1 - wall - margin - bounds.max[axis]);
     const double share = m.direction[axis] / lead;
     double wanted = least + (most - least) * m.place[axis];
     if (share < 0) wanted = least - share * m.gap;

@@ -41,9 +41,9 @@ ParticleCloud read_particles_hdf5(const std::filesystem::path& file, std::int64_
 
 }  // namespace
 
-Bounds ParticleCloud::bounds() const {
-  Bounds bounds{x[0], x[0]};
-  for (const Vector3d& p : x) {
+Bounds bounds_of(const std::vector<Vector3d>& points) {
+  Bounds bounds{points[0], points[0]};
+  for (const Vector3d& p : points) {
     bounds.min = bounds.min.cwiseMin(p);
     bounds.max = bounds.max.cwiseMax(p);
   }

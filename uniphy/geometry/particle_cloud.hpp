@@ -9,13 +9,16 @@
 
 namespace uniphy {
 
+/// The smallest box round the points, of which there is at least one.
+Bounds bounds_of(const std::vector<Eigen::Vector3d>& points);
+
 /// Particles given one by one.
 struct ParticleCloud {
   std::vector<Eigen::Vector3d> x;  ///< m
   /// m³ of each particle: as long as x, or empty where the file has none.
   std::vector<double> volume;
 
-  Bounds bounds() const;
+  Bounds bounds() const { return bounds_of(x); }
 };
 
 /// Reads particles: from an HDF5 file (ends in .h5 or .hdf5) the dataset /x, [particles, 3] or

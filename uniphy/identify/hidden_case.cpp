@@ -29,19 +29,12 @@ bool meets_wall_early(const Observation& observation) {
 }
 
 Observation observation_from(const TrajectorySetup& setup, const Trajectory& truth) {
-  const kernels::GridSettings& grid = setup.scene.grid;
-  Observation o;
+  kernels::GridSettings grid = setup.scene.grid;
+  grid.dt = *setup.scene.dt;
+  Observation o = begin_observation(grid, setup.scene.bodies.front().density, truth.volume);
   o.frames = truth.frames;
-  o.particles = truth.particles;
   o.x = truth.x;
   o.time = truth.time;
-  o.volume = truth.volume;
-  o.grid = grid.n;
-  o.dt = *setup.scene.dt;
-  std::copy_n(grid.gravity, 3, o.gravity.begin());
-  o.walls = grid.wall == kernels::Wall::noslip ? "noslip" : "freeslip";
-  o.bound = grid.bound;
-  o.density = setup.scene.bodies.front().density;
   return o;
 }
 

@@ -30,13 +30,6 @@ void reset_peak_memory() {
   std::ofstream("/proc/self/clear_refs") << "5";
 }
 
-/// What the pictures need of a finished material.
-struct Pictured {
-  std::string material;
-  Trajectory observed, fitted, foretold, truth;
-  std::vector<double> best;  ///< over the roll-outs of the result's candidate, m²
-};
-
 /// Best loss so far of the candidate that the result comes from, within each stage.
 std::vector<double> best_so_far(const FitResult& fit) {
   std::vector<double> best;
@@ -56,11 +49,13 @@ Trajectory foretell(const HiddenCase& hidden, const kernels::LawDescription& law
   return run_scene(scene);
 }
 
-Identified identify_one(const IdentifyOptions& options, std::int64_t material,
-                        const Unknowns& unknowns, RunDirectory& out, Pictured& pictured) {
+CaseResult identify_one(const IdentifyOptions& options, std::int64_t material,
+                        const Unknowns& unknowns, const RunDirectory& out) {
   const auto start = std::chrono::steady_clock::now();
   reset_peak_memory();
-  Identified row;
+  CaseResult found;
+  Identified& row = found.row;
+  CasePictures& pictured = found.pictures;
   row.material = options.hidden.draw.materials[material].name();
   row.fit_mse = row.fit_share = row.other_best = row.resim_mse = row.resim_share = kNan;
   const std::filesystem::path folder = out.file(row.material);
@@ -106,7 +101,21 @@ Identified identify_one(const IdentifyOptions& options, std::int64_t material,
   row.resim_share = comparison.root_over_size;
   row.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   row.memory_mb = peak_memory_mb();
-  return row;
+  return found;
+}
+
+CaseResult taken_up_or_identified(const IdentifyOptions& options, std::int64_t material,
+                                  const Unknowns& unknowns, const std::string& fingerprint,
+                                  const RunDirectory& out) {
+  const std::string name = options.hidden.draw.materials[material].name();
+  const std::filesystem::path folder = out.file(name);
+  if (auto finished = read_case_result(folder, fingerprint)) {
+    std::fprintf(stderr, "%s: finished by the interrupted run\n", name.c_str());
+    return *std::move(finished);
+  }
+  CaseResult found = identify_one(options, material, unknowns, out);
+  write_case_result(folder, found, fingerprint);
+  return found;
 }
 
 void add_row(Metrics& metrics, const Identified& row) {
@@ -124,14 +133,14 @@ void add_row(Metrics& metrics, const Identified& row) {
   set("memory_mb", row.memory_mb);
 }
 
-void draw_pictures(const std::vector<Pictured>& all, RunDirectory& out) {
+void draw_pictures(const std::vector<CasePictures>& all, RunDirectory& out) {
   Chart chart;
   chart.title = "Loss of the result's candidate; it rises where the horizon grows";
   chart.x_label = "roll-outs with gradients";
   chart.y_label = "position mse up to the horizon (m^2)";
   chart.log_y = true;
   std::vector<ParticlePanel> panels;
-  for (const Pictured& p : all) {
+  for (const CasePictures& p : all) {
     Series series;
     series.label = p.material;
     for (std::size_t i = 0; i < p.best.size(); ++i) {
@@ -182,20 +191,23 @@ std::string identify_table(const std::vector<Identified>& rows) {
 
 void identify(const IdentifyOptions& options, RunDirectory& out, Metrics& metrics) {
   const auto unknowns = options.unknowns.load();
+  // The scenes follow from the configuration.
+  const std::string fingerprint = fit_fingerprint({}, *unknowns, out.config_yaml());
   std::vector<Identified> rows;
-  std::vector<Pictured> pictures;
+  std::vector<CasePictures> pictures;
   std::string failures;
   const auto count = static_cast<std::int64_t>(options.hidden.draw.materials.size());
   for (std::int64_t material = 0; material < count; ++material) {
-    Pictured pictured;
+    const std::string name = options.hidden.draw.materials[material].name();
     Identified row;
     try {
-      row = identify_one(options, material, *unknowns, out, pictured);
-      pictures.push_back(std::move(pictured));
+      CaseResult found = taken_up_or_identified(options, material, *unknowns, fingerprint, out);
+      row = found.row;
+      pictures.push_back(std::move(found.pictures));
     } catch (const Interrupted&) {
       throw;
     } catch (const Error& error) {
-      row.material = options.hidden.draw.materials[material].name();
+      row.material = name;
       row.fit_mse = row.resim_mse = kNan;
       failures += fmt::format("; {}: {}", row.material, error.what());
     }
@@ -210,6 +222,7 @@ void identify(const IdentifyOptions& options, RunDirectory& out, Metrics& metric
     metrics.write(out.file("metrics.json"));
     throw Error(failures.substr(2));
   }
+  for (const Identified& row : rows) forget_case_result(out.file(row.material));
 }
 
 }  // namespace uniphy

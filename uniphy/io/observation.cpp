@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "ops/kernels/error.hpp"
@@ -48,6 +49,26 @@ void check(const Observation& observation, const Fail& fail) {
 }
 
 }  // namespace
+
+Observation begin_observation(const kernels::GridSettings& grid, double density,
+                              const std::vector<double>& volume) {
+  Observation o;
+  o.particles = static_cast<std::int64_t>(volume.size());
+  o.volume = volume;
+  o.grid = grid.n;
+  o.dt = grid.dt;
+  std::copy_n(grid.gravity, 3, o.gravity.begin());
+  o.walls = grid.wall == kernels::Wall::noslip ? "noslip" : "freeslip";
+  o.bound = grid.bound;
+  o.density = density;
+  return o;
+}
+
+void add_frame(Observation& observation, double time, const std::vector<double>& x) {
+  observation.time.push_back(time);
+  observation.x.insert(observation.x.end(), x.begin(), x.end());
+  ++observation.frames;
+}
 
 void write_observation(const std::filesystem::path& file, const Observation& observation) {
   hdf5::Writer writer(file);

@@ -15,6 +15,8 @@
 #include <string>
 #include <vector>
 
+#include "ops/kernels/grid.hpp"
+
 namespace uniphy {
 
 struct Observation {
@@ -33,6 +35,13 @@ struct Observation {
 
   const double* positions(std::int64_t frame) const { return x.data() + frame * particles * 3; }
 };
+
+/// What is known of a scene of one body besides its motion, without any frame; grid.dt is the time
+/// step.
+Observation begin_observation(const kernels::GridSettings& grid, double density,
+                              const std::vector<double>& volume);
+/// Adds the positions x [particles, 3] at `time`.
+void add_frame(Observation& observation, double time, const std::vector<double>& x);
 
 void write_observation(const std::filesystem::path& file, const Observation& observation);
 /// Throws Error for anything that is missing, of the wrong shape, not finite, or out of range.

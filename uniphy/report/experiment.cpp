@@ -46,8 +46,8 @@ std::string help_text(const ExperimentInfo& info, const DeclareFunction& declare
       info.name, info.summary, info.name);
   add_lines(text, "Reads", info.reads);
   std::vector<std::string> writes = info.writes;
-  writes.push_back("DIR/config.yaml   the configuration with every default filled in");
-  writes.push_back("DIR/metrics.json  name -> number, with wall_s and peak_memory_mb");
+  writes.push_back("DIR/config.yaml     the configuration with every default filled in");
+  writes.push_back("DIR/metrics.json    name -> number, with wall_s and peak_memory_mb");
   add_lines(text, "Writes", writes);
   add_lines(text, "Options",
             {"--set KEY=VALUE  sets a key over the file, value in YAML (bodies.0.density=500)",

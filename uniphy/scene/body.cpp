@@ -33,17 +33,12 @@ BodyParticles place(const BodyDescription& body) {
   if (!body.solid && (!body.cloud || body.cloud->x.empty())) {
     throw Error("expected a shape or particles, found neither");
   }
-  const Bounds bounds = body.solid ? body.solid->bounds() : body.cloud->bounds();
-  double scale = 1;
-  if (body.placement.size > 0 && !body.in_place) {
-    if (!(bounds.largest_side() > 0)) throw Error("size: all particles stand at one place");
-    scale = body.placement.size / bounds.largest_side();
-  }
-  const double cube = scale * scale * scale;
+  const BodyFrame frame = frame_of(body);
+  const double cube = frame.scale * frame.scale * frame.scale;
 
   BodyParticles particles;
   if (body.solid) {
-    particles.x = fill(body, scale);
+    particles.x = fill(body, frame.scale);
     const double share = body.solid->volume() * cube / static_cast<double>(particles.x.size());
     particles.volume.assign(particles.x.size(), share);
   } else {
@@ -60,16 +55,12 @@ BodyParticles place(const BodyDescription& body) {
     for (double& volume : particles.volume) volume *= cube;
   }
 
-  Vector3d centre = bounds.centre();
   if (!body.in_place) {
-    for (Vector3d& x : particles.x) {
-      x = body.placement.centre + body.placement.rotation * (scale * (x - centre));
-    }
-    centre = body.placement.centre;
+    for (Vector3d& x : particles.x) x = frame.to_scene(x);
   }
   particles.v.reserve(particles.x.size());
   for (const Vector3d& x : particles.x) {
-    particles.v.push_back(body.velocity + body.angular_velocity.cross(x - centre));
+    particles.v.push_back(body.velocity + body.angular_velocity.cross(x - frame.centre));
   }
   particles.mass.reserve(particles.volume.size());
   for (const double volume : particles.volume) particles.mass.push_back(body.density * volume);
@@ -77,6 +68,20 @@ BodyParticles place(const BodyDescription& body) {
 }
 
 }  // namespace
+
+BodyFrame frame_of(const BodyDescription& body) {
+  const Bounds bounds = body.solid ? body.solid->bounds() : body.cloud->bounds();
+  BodyFrame frame;
+  frame.own_centre = frame.centre = bounds.centre();
+  if (body.in_place) return frame;
+  if (body.placement.size > 0) {
+    if (!(bounds.largest_side() > 0)) throw Error("size: all particles stand at one place");
+    frame.scale = body.placement.size / bounds.largest_side();
+  }
+  frame.centre = body.placement.centre;
+  frame.rotation = body.placement.rotation;
+  return frame;
+}
 
 BodyParticles place_body(const BodyDescription& body) {
   try {

@@ -54,6 +54,23 @@ struct BodyDescription {
   kernels::LawDescription law;
 };
 
+/// How a body's own frame stands in the scene: x = centre + s R (p − own centre).
+struct BodyFrame {
+  double scale = 1;                                        ///< s
+  Eigen::Vector3d own_centre = Eigen::Vector3d::Zero();    ///< of the bounds, in the body's frame
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();        ///< m
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< R
+
+  Eigen::Vector3d to_scene(const Eigen::Vector3d& p) const {
+    return centre + rotation * (scale * (p - own_centre));
+  }
+  Eigen::Vector3d to_body(const Eigen::Vector3d& x) const {
+    return own_centre + rotation.transpose() * (x - centre) / scale;
+  }
+};
+/// Of a body that has a shape or particles. Throws Error where its size is nothing.
+BodyFrame frame_of(const BodyDescription& body);
+
 /// The particles of a body as they stand in the scene; particle p is row p.
 struct BodyParticles {
   std::vector<Eigen::Vector3d> x;  ///< m

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "ops/kernels/error.hpp"
+#include "uniphy/scene/overlap.hpp"
 
 namespace uniphy {
 namespace {
@@ -30,11 +31,7 @@ void check_settings(const SceneDescription& scene) {
 // (a state of an earlier run, say) may lean on the walls and only have to stay on the grid.
 void check_extent(const BodyDescription& body, const BodyParticles& particles,
                   const kernels::GridSettings& grid) {
-  Bounds bounds{particles.x[0], particles.x[0]};
-  for (const Vector3d& x : particles.x) {
-    bounds.min = bounds.min.cwiseMin(x);
-    bounds.max = bounds.max.cwiseMax(x);
-  }
+  const Bounds bounds = bounds_of(particles.x);
   const double dx = grid.dx();
   const double low = body.in_place ? 0.5 * dx : std::max(1, grid.bound) * dx;
   const double high = body.in_place ? 1 - 1.5 * dx : 1 - low;
@@ -112,9 +109,11 @@ PlacedScene place_scene(const SceneDescription& scene) {
   placed.grid.check();
   placed.first.push_back(0);
   double stable = std::numeric_limits<double>::infinity();
+  std::vector<BodyParticles> all;
   for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
     const BodyDescription& body = scene.bodies[b];
-    const BodyParticles particles = place_body(body);
+    all.push_back(place_body(body));
+    const BodyParticles& particles = all.back();
     check_extent(body, particles, scene.grid);
     stable = std::min(stable, stable_step_of(scene, body, particles));
     for (const Vector3d& x : particles.x) placed.x.insert(placed.x.end(), x.data(), x.data() + 3);
@@ -124,6 +123,7 @@ PlacedScene place_scene(const SceneDescription& scene) {
     placed.body.insert(placed.body.end(), particles.x.size(), static_cast<std::int32_t>(b));
     placed.first.push_back(placed.particles());
   }
+  check_overlap(scene.bodies, all);
   placed.stable_dt = stable;
   if (!scene.dt) {
     if (!(std::isfinite(stable) && stable > 1e-12)) {

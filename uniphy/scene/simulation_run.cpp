@@ -6,6 +6,8 @@
 #include <chrono>
 #include <numeric>
 
+#include "ops/kernels/error.hpp"
+#include "uniphy/io/observation.hpp"
 #include "uniphy/report/plot.hpp"
 #include "uniphy/report/progress.hpp"
 
@@ -50,6 +52,10 @@ SimulationOutput read_simulation_output(Section& config) {
     if (field == "C") output.fields.C = true;
     if (field == "F") output.fields.F = true;
   }
+  output.observation = section.boolean(
+      "observation", false,
+      "also observation.h5, all that uniphy_infer may see: positions, times, walls, "
+      "density and volumes of a single body, nothing about its law");
   output.gzip = static_cast<int>(
       section.integer("gzip", 0, between(0, 9), "", "compression of the trajectory, 0: none"));
   output.picture_frames =
@@ -60,6 +66,10 @@ SimulationOutput read_simulation_output(Section& config) {
 void simulate_into(const SceneDescription& scene, const SimulationOutput& output, RunDirectory& out,
                    Metrics& metrics) {
   const PlacedScene placed = place_scene(scene);
+  if (output.observation && scene.bodies.size() != 1) {
+    throw Error(fmt::format("output.observation: expected a scene of one body, found {}",
+                            scene.bodies.size()));
+  }
   record_metrics(scene, placed, metrics);
   // The margin is the user's to use up; the limit itself is not.
   const double limit = placed.stable_dt / scene.safety;
@@ -78,6 +88,7 @@ void simulate_into(const SceneDescription& scene, const SimulationOutput& output
   header.scene = out.config_yaml();
   TrajectoryWriter writer(out.file("trajectory.h5"), header, output.fields, output.gzip);
 
+  Observation seen = begin_observation(placed.grid, scene.bodies.front().density, placed.volume);
   const std::int64_t frames = placed.steps / scene.frame_stride + 1;
   ParticlePicture picture;
   picture.columns = static_cast<int>(std::min<std::int64_t>(output.picture_frames, 6));
@@ -95,6 +106,7 @@ void simulate_into(const SceneDescription& scene, const SimulationOutput& output
                     picture.panels.push_back(std::move(panel));
                   }
                   writer.append(time, step, state);
+                  if (output.observation) add_frame(seen, time, state.x);
                   progress.update(step);
                   return true;
                 });
@@ -103,6 +115,7 @@ void simulate_into(const SceneDescription& scene, const SimulationOutput& output
   progress.finish();
   metrics.set("frames", static_cast<double>(writer.frames()));
   writer.finish(last);
+  if (output.observation) write_observation(out.file("observation.h5"), seen);
   const double particle_steps =
       static_cast<double>(placed.particles()) * static_cast<double>(placed.steps);
   if (particle_steps > 0) metrics.set("ns_per_particle_step", 1e9 * seconds / particle_steps);

@@ -12,15 +12,17 @@ namespace uniphy {
 struct SimulationOutput {
   FrameFields fields;               ///< stored with every frame besides x
   int gzip = 0;                     ///< 0 … 9
+  bool observation = false;         ///< observation.h5 too, for uniphy_infer; one body only
   std::int64_t picture_frames = 6;  ///< panels of frames.png, 0: no picture
 };
 
 /// Declares and reads the section `output`.
 SimulationOutput read_simulation_output(Section& config);
 
-/// Runs the scene and writes trajectory.h5, trajectory.xdmf and frames.png into `out`; frames go to
-/// the disk as they come. Metrics: dt, stable_dt (s), steps, frames, simulated_s, particles and,
-/// for each body, particles.NAME and volume.NAME (m³), mass (kg), ns_per_particle_step.
+/// Runs the scene and writes trajectory.h5, trajectory.xdmf, frames.png and, where it is asked for,
+/// observation.h5 into `out`; frames go to the disk as they come. Metrics: dt, stable_dt (s),
+/// steps, frames, simulated_s, particles and, for each body, particles.NAME and volume.NAME (m³),
+/// mass (kg), ns_per_particle_step.
 void simulate_into(const SceneDescription& scene, const SimulationOutput& output, RunDirectory& out,
                    Metrics& metrics);
 

@@ -120,7 +120,8 @@ TEST_P(ExampleScene, CanStart) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Configs, ExampleScene,
-                         testing::Values("benchmark_cube", "five_materials", "two_bodies", "mesh"),
+                         testing::Values("benchmark_cube", "falling_torus", "five_materials",
+                                         "two_bodies", "mesh"),
                          [](const auto& info) { return std::string(info.param); });
 
 struct BadScene {

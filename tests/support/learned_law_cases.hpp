@@ -1,0 +1,79 @@
+#pragma once
+
+#include <torch/torch.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "ops/learned_law.hpp"
+#include "tests/support/law_cases.hpp"
+#include "tests/support/random_weights.hpp"
+#include "tests/support/tensors.hpp"
+
+namespace uniphy::testing {
+
+/// Relative errors of the learned law's op against central differences, group by group of
+/// deformation_cases.
+struct LearnedLawErrors {
+  std::map<std::string, double> F, C, z;
+};
+
+/// Fourth-order central differences of `loss` along every coordinate of `x`. Random networks have
+/// their yield surfaces anywhere: a coordinate whose two step sizes disagree has a kink within its
+/// stencil, and is left out on both sides.
+template <class Loss>
+double smooth_gradient_error(const torch::Tensor& gradient, const torch::Tensor& x, double step,
+                             const Loss& loss) {
+  const torch::NoGradGuard guard;
+  const torch::Tensor fine = numerical_gradient(loss, x, step);
+  const torch::Tensor coarse = numerical_gradient(loss, x, 3 * step);
+  const torch::Tensor smooth = (fine - coarse).abs() <= 1e-5 * (fine.abs().max() + 1e-12);
+  if (smooth.sum().item<std::int64_t>() * 10 < smooth.numel() * 9) return INFINITY;
+  const torch::Tensor error = (gradient - fine).masked_select(smooth);
+  return (error.norm() / fine.masked_select(smooth).norm()).item<double>();
+}
+
+/// A law with random weights. The seed form sees the factors of F, which have a derivative only
+/// where the singular values are apart: the other cases are left out.
+inline LearnedLawErrors learned_law_errors(kernels::LawForm form) {
+  const auto weights = std::make_shared<kernels::LearnedLawWeights>(
+      random_weights(form, 5, 20, 2, kernels::Activation::gelu, 7));
+  const auto elastic = kernels::without_projection(*weights);
+  LearnedLawErrors errors;
+  std::mt19937_64 random(29);
+  for (const DeformationCase& c : deformation_cases()) {
+    const double upper = c.sigma[0] - c.sigma[4], lower = c.sigma[4] - std::abs(c.sigma[8]);
+    if (form == kernels::LawForm::seed && std::min(upper, lower) < 0.01) continue;
+    // A random law yields at rest, as sand does: F = I is its tip, where no derivative exists. What
+    // does not yield has one there.
+    const ops::SharedWeights law = c.F == identity() ? elastic : weights;
+    const torch::Tensor F = to_tensor({c.F}).requires_grad_();
+    const torch::Tensor C = to_tensor({random_matrix(random, 8)}).requires_grad_();
+    const torch::Tensor z =
+        torch::tensor({0.3, -0.2, 0.5, -0.7, 0.1}, torch::kFloat64).requires_grad_();
+    const torch::Tensor G = to_tensor({random_matrix(random)});
+    const torch::Tensor S = to_tensor({random_matrix(random, 1e-4)});  // 1/Pa
+    const auto loss = [&](const torch::Tensor& f, const torch::Tensor& rate,
+                          const torch::Tensor& code) {
+      const ops::LawOutput out = ops::learned_law(law, f, rate, code);
+      return (G * out.F_proj + S * out.tau).sum();
+    };
+    const auto g = torch::autograd::grad({loss(F, C, z)}, {F, C, z});
+    const auto keep = [&](std::map<std::string, double>& worst, double error) {
+      worst[c.group] = std::max(worst[c.group], error);
+    };
+    keep(errors.F, smooth_gradient_error(g[0], F, c.step,
+                                         [&](const torch::Tensor& f) { return loss(f, C, z); }));
+    keep(errors.C, smooth_gradient_error(g[1], C, 1e-2,
+                                         [&](const torch::Tensor& r) { return loss(F, r, z); }));
+    keep(errors.z, smooth_gradient_error(g[2], z, 1e-4,
+                                         [&](const torch::Tensor& k) { return loss(F, C, k); }));
+  }
+  return errors;
+}
+
+}  // namespace uniphy::testing

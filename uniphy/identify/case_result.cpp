@@ -1,0 +1,74 @@
+#include "uniphy/identify/case_result.hpp"
+
+#include <array>
+#include <utility>
+
+#include "uniphy/inference/infer_run.hpp"
+#include "uniphy/io/hdf5.hpp"
+#include "uniphy/io/observation.hpp"
+
+namespace uniphy {
+namespace {
+
+constexpr const char* kFormat = "uniphy-identified-case";
+constexpr const char* kFile = "case.h5";
+
+constexpr std::array<std::pair<const char*, std::string Identified::*>, 4> kTexts{
+    {{"material", &Identified::material},
+     {"shape", &Identified::shape},
+     {"other_shape", &Identified::other_shape},
+     {"nearest", &Identified::nearest}}};
+constexpr std::array<std::pair<const char*, double Identified::*>, 7> kNumbers{
+    {{"fit_mse", &Identified::fit_mse},
+     {"fit_root_over_size", &Identified::fit_share},
+     {"other_best_mse", &Identified::other_best},
+     {"resim_mse", &Identified::resim_mse},
+     {"resim_root_over_size", &Identified::resim_share},
+     {"seconds", &Identified::wall_s},
+     {"memory_mb", &Identified::memory_mb}}};
+
+}  // namespace
+
+void write_case_result(const std::filesystem::path& folder, const CaseResult& result,
+                       const std::string& fingerprint) {
+  hdf5::Writer writer(folder / kFile);
+  writer.attribute("/", "format", kFormat);
+  writer.attribute("/", "version", 1);
+  writer.attribute("/", "fingerprint", fingerprint);
+  for (const auto& [name, text] : kTexts) writer.attribute("/", name, result.row.*text);
+  for (const auto& [name, number] : kNumbers) writer.attribute("/", name, result.row.*number);
+  writer.attribute("/", "beats_other", result.row.beats_other ? 1 : 0);
+  writer.attribute("/", "roll_outs", static_cast<std::int64_t>(result.row.roll_outs));
+  const std::vector<double>& best = result.pictures.best;
+  writer.write("best", best, {static_cast<std::int64_t>(best.size())},
+               {"m^2", "best loss so far within each stage, over the roll-outs of the result"});
+  writer.commit();
+}
+
+std::optional<CaseResult> read_case_result(const std::filesystem::path& folder,
+                                           const std::string& fingerprint) {
+  if (!std::filesystem::exists(folder / kFile)) return {};
+  const hdf5::Reader reader(folder / kFile);
+  reader.check_format(kFormat, 1);
+  if (reader.attribute_text("/", "fingerprint") != fingerprint) return {};
+  CaseResult result;
+  for (const auto& [name, text] : kTexts) result.row.*text = reader.attribute_text("/", name);
+  for (const auto& [name, number] : kNumbers) result.row.*number = reader.attribute_real("/", name);
+  result.row.beats_other = reader.attribute_integer("/", "beats_other") != 0;
+  result.row.roll_outs = static_cast<std::size_t>(reader.attribute_integer("/", "roll_outs"));
+  CasePictures& pictures = result.pictures;
+  pictures.material = result.row.material;
+  pictures.best = reader.read<double>("best", {-1});
+  pictures.observed = observed_trajectory(read_observation(folder / "observation.h5"));
+  pictures.fitted = read_trajectory(folder / "fitted.h5", true);
+  pictures.foretold = read_trajectory(folder / "resimulated.h5", true);
+  pictures.truth = read_trajectory(folder / "other_truth.h5", true);
+  return result;
+}
+
+void forget_case_result(const std::filesystem::path& folder) {
+  std::error_code ignored;
+  std::filesystem::remove(folder / kFile, ignored);
+}
+
+}  // namespace uniphy
