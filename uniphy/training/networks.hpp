@@ -31,6 +31,8 @@ struct Networks {
   kernels::LearnedLawWeights weights() const;
   std::vector<torch::Tensor> parameters() const;
   std::int64_t parameter_count() const;
+  /// The same weights, shared, without gradients: a fit of z alone need not pay for theirs.
+  Networks frozen() const;
 };
 
 }  // namespace uniphy
