@@ -100,17 +100,17 @@ torch::Tensor forward(const torch::Tensor& x, const kernels::PackedMlp<T>& net) 
   return y;
 }
 
-/// Gradients of x (where wanted) and of the flat weights.
+/// Gradients of x and of the flat weights, each where it is wanted.
 template <class T>
 variable_list backward(const torch::Tensor& x, const torch::Tensor& flat, const torch::Tensor& grad,
-                       const kernels::PackedMlp<T>& net, bool want_x) {
+                       const kernels::PackedMlp<T>& net, bool want_x, bool want_weights) {
   const auto& table = kernels::learned_law_table<T>();
   const std::int64_t samples = x.size(0), tiles = (samples + kTile - 1) / kTile;
   const std::int64_t plane = std::int64_t(net.max_width) * kTile, lanes = table.lanes;
   torch::Tensor grad_x = want_x ? torch::empty_like(x) : torch::Tensor();
   const std::int64_t numbers_per_sum = flat.numel() * lanes;
-  kernels::AlignedBuffer<T> sums(kSums * numbers_per_sum);
-  std::fill_n(sums.data(), kSums * numbers_per_sum, T(0));
+  kernels::AlignedBuffer<T> sums(want_weights ? kSums * numbers_per_sum : 0);
+  if (want_weights) std::fill_n(sums.data(), kSums * numbers_per_sum, T(0));
   const T *from = x.data_ptr<T>(), *grad_from = grad.data_ptr<T>();
   T* grad_to = want_x ? grad_x.data_ptr<T>() : nullptr;
 #pragma omp parallel
@@ -121,8 +121,8 @@ variable_list backward(const torch::Tensor& x, const torch::Tensor& flat, const 
     std::vector<kernels::WeightGradient<T>> weights(net.depth);
 #pragma omp for schedule(static)
     for (std::int64_t sum = 0; sum < kSums; ++sum) {
-      T* at = sums.data() + sum * numbers_per_sum;
-      for (int k = 0; k < net.depth; ++k) {
+      T* at = sums.data() + (want_weights ? sum * numbers_per_sum : 0);
+      for (int k = 0; want_weights && k < net.depth; ++k) {
         weights[k].weight = at;
         at += std::int64_t(net.layer[k].in) * net.layer[k].out * lanes;
         weights[k].bias = at;
@@ -135,11 +135,12 @@ variable_list backward(const torch::Tensor& x, const torch::Tensor& flat, const 
         to_planes(grad_from + first * net.out(), count, net.out(), grad_out);
         table.mlp_forward(net, in, out, tape);
         table.mlp_backward(net, in, tape, grad_out, want_x ? grad_in : nullptr, nullptr,
-                           weights.data());
+                           want_weights ? weights.data() : nullptr);
         if (want_x) from_planes(grad_in, count, net.in(), grad_to + first * net.in());
       }
     }
   }
+  if (!want_weights) return {grad_x, torch::Tensor()};
   torch::Tensor grad_flat = torch::empty_like(flat);
   T* to = grad_flat.data_ptr<T>();
   for (std::int64_t i = 0; i < flat.numel(); ++i) {
@@ -174,11 +175,13 @@ struct MlpFunction : torch::autograd::Function<MlpFunction> {
     const torch::Tensor &x = saved[0], &flat = saved[1], grad = grads[0].contiguous();
     const std::vector<std::int64_t> widths = ctx->saved_data["widths"].toIntVector();
     const auto kind = static_cast<kernels::Activation>(ctx->saved_data["activation"].toInt());
-    const bool want_x = ctx->needs_input_grad(0);
+    const bool want_x = ctx->needs_input_grad(0), want_weights = ctx->needs_input_grad(1);
     const variable_list g =
         x.scalar_type() == torch::kFloat64
-            ? ops::backward<double>(x, flat, grad, pack<double>(flat, widths, kind)->mlp(), want_x)
-            : ops::backward<float>(x, flat, grad, pack<float>(flat, widths, kind)->mlp(), want_x);
+            ? ops::backward<double>(x, flat, grad, pack<double>(flat, widths, kind)->mlp(), want_x,
+                                    want_weights)
+            : ops::backward<float>(x, flat, grad, pack<float>(flat, widths, kind)->mlp(), want_x,
+                                   want_weights);
     result[0] = g[0];
     result[1] = g[1];
     return result;

@@ -86,5 +86,17 @@ TEST(Mlp, UndefinedGradientsStayUndefined) {
   EXPECT_TRUE(l[0].weight.grad().defined());
 }
 
+TEST(Mlp, FrozenWeightsLeaveTheGradientOfTheInputAsItIs) {
+  auto l = layers({11, 32, 5}, torch::kFloat32);
+  const Tensor x = torch::randn({300, 11}).requires_grad_();
+  const auto gradient = [&] {
+    const Tensor y = mlp(x, l, kernels::Activation::silu);
+    return torch::autograd::grad({y.pow(2).sum()}, {x})[0];
+  };
+  const Tensor with_weights = gradient();
+  for (LinearLayer& layer : l) layer = {layer.weight.detach(), layer.bias.detach()};
+  EXPECT_TRUE(torch::equal(gradient(), with_weights));
+}
+
 }  // namespace
 }  // namespace uniphy::ops

@@ -122,4 +122,16 @@ void generate_dataset(const GenerateOptions& options, const std::string& config_
   std::filesystem::remove_all(parts);
 }
 
+Dataset drawn_dataset(const GenerateOptions& options, const std::filesystem::path& file,
+                      Metrics* metrics) {
+  const std::string config = generate_config(options);
+  if (std::filesystem::exists(file)) {
+    Dataset data = read_dataset(file);
+    if (data.config == config) return data;
+  }
+  Metrics unused;
+  generate_dataset(options, config, file, metrics ? *metrics : unused);
+  return read_dataset(file);
+}
+
 }  // namespace uniphy

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "uniphy/data/generate_options.hpp"
+#include "uniphy/io/dataset.hpp"
 #include "uniphy/report/metrics.hpp"
 
 namespace uniphy {
@@ -25,5 +26,11 @@ namespace uniphy {
 /// (trajectories whose step is below simulation.dt).
 void generate_dataset(const GenerateOptions& options, const std::string& config_yaml,
                       const std::filesystem::path& file, Metrics& metrics);
+
+/// The data set of these options: read from `file` where that was drawn with exactly this
+/// configuration, drawn into it (generate_dataset with generate_config(options)) otherwise.
+/// Metrics, unless null, are set only where it is drawn. Throws Error where `file` is no data set.
+Dataset drawn_dataset(const GenerateOptions& options, const std::filesystem::path& file,
+                      Metrics* metrics = nullptr);
 
 }  // namespace uniphy

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 
+#include "ops/kernels/error.hpp"
 #include "uniphy/geometry/shape_catalogue.hpp"
 
 namespace uniphy {
@@ -153,18 +154,40 @@ GenerateOptions read_generate_options(Section& config) {
   const std::string split =
       config.choice("split", "train", {"train", "heldout_materials", "heldout_all"},
                     "heldout_materials: new parameters; heldout_all: new shapes and motions too");
-  o.split = split == "train"               ? Split::train
-            : split == "heldout_materials" ? Split::heldout_materials
-                                           : Split::heldout_all;
-  o.trajectories =
-      config.integer("trajectories", 40, between(1, 100000), "", "trajectories of each material");
+  o.split = split_from_name(split);
+  read_draw_options(config, o);
+  return o;
+}
+
+void read_draw_options(Section& config, GenerateOptions& o) {
+  o.trajectories = config.integer("trajectories", o.trajectories, between(1, 100000), "",
+                                  "trajectories of each material");
   o.attempts = config.integer("attempts", 20, between(1, 1000), "",
                               "draws for one trajectory: a run that fails is replaced");
   read_materials(config, o);
   read_simulation(config, o);
   read_bodies(config, o);
   read_samples(config, o);
-  return o;
+}
+
+const char* split_name(Split split) {
+  switch (split) {
+    case Split::train:
+      return "train";
+    case Split::heldout_materials:
+      return "heldout_materials";
+    case Split::heldout_all:
+      break;
+  }
+  return "heldout_all";
+}
+
+Split split_from_name(const std::string& name) {
+  for (const Split split : {Split::train, Split::heldout_materials, Split::heldout_all}) {
+    if (name == split_name(split)) return split;
+  }
+  throw Error("expected a split from train, heldout_materials, heldout_all, found \"" + name +
+              "\"");
 }
 
 }  // namespace uniphy

@@ -19,6 +19,11 @@ enum class Split {
   heldout_all         ///< new parameters, motions, and shapes that train never uses
 };
 
+/// "train", "heldout_materials", "heldout_all".
+const char* split_name(Split split);
+/// Throws Error that lists the known names.
+Split split_from_name(const std::string& name);
+
 /// How a data set is drawn; the defaults are those of the keys (read_generate_options).
 struct GenerateOptions {
   std::uint64_t seed = 1;
@@ -64,5 +69,13 @@ struct GenerateOptions {
 
 /// Declares and reads all keys of uniphy_generate.
 GenerateOptions read_generate_options(Section& config);
+/// The same without `seed` and `split`, for work that draws several sets itself. The default of the
+/// key `trajectories` is what `options` holds.
+void read_draw_options(Section& config, GenerateOptions& options);
+
+/// The configuration of uniphy_generate that draws with these options, every key resolved: it reads
+/// back to the same options, and what generate_dataset writes with it is to the bit what the binary
+/// writes.
+std::string generate_config(const GenerateOptions& options);
 
 }  // namespace uniphy

@@ -13,9 +13,10 @@ namespace uniphy {
 struct Series {
   std::string label;  ///< empty: not in the legend
   std::vector<double> x;
-  std::vector<double> y;       ///< same length as x; points that are not finite leave a gap
-  std::vector<double> colour;  ///< empty, or a value a point, shown by the colour scale
-  bool points = false;         ///< markers instead of a line
+  std::vector<double> y;           ///< same length as x; points that are not finite leave a gap
+  std::vector<double> colour;      ///< empty, or a value a point, shown by the colour scale
+  bool points = false;             ///< markers instead of a line
+  std::vector<std::string> names;  ///< empty, or a text beside every point
 };
 
 struct Chart {

@@ -32,6 +32,10 @@ bool plot_chart(const std::filesystem::path& png, const Chart& chart) {
           "found {} (and {})",
           png.string(), series.label, series.x.size(), series.y.size(), series.colour.size()));
     }
+    if (!series.names.empty() && series.names.size() != series.x.size()) {
+      throw Error(fmt::format("{}: series \"{}\": expected as many names as x ({}), found {}",
+                              png.string(), series.label, series.x.size(), series.names.size()));
+    }
     std::string block;
     bool any = false;
     for (std::size_t k = 0; k < series.x.size(); ++k) {
@@ -39,8 +43,9 @@ bool plot_chart(const std::filesystem::path& png, const Chart& chart) {
                         (series.colour.empty() || std::isfinite(series.colour[k]));
       any = any || good;
       // An empty line ends one stroke and begins the next.
-      block += good ? fmt::format("{} {} {}\n", series.x[k], series.y[k],
-                                  series.colour.empty() ? 0.0 : series.colour[k])
+      block += good ? fmt::format("{} {} {} {}\n", series.x[k], series.y[k],
+                                  series.colour.empty() ? 0.0 : series.colour[k],
+                                  series.names.empty() ? "" : gnuplot_text(series.names[k]))
                     : "\n";
     }
     if (!any) continue;
@@ -58,6 +63,12 @@ bool plot_chart(const std::filesystem::path& png, const Chart& chart) {
                           series.points ? "points pt 7 ps 0.9" : "lines lw 2", colour);
     }
     plot += fmt::format("{} $s{} {} {}", plot.empty() ? "plot" : ", \\\n    ", i, style, title);
+    if (!series.names.empty()) {
+      plot += fmt::format(
+          ", \\\n    $s{} using 1:2:4 with labels noenhanced left offset 0.7,0.4 "
+          "font ',9' notitle",
+          i);
+    }
   }
   if (plot.empty()) {
     std::fprintf(stderr, "warning: %s: not drawn, no point can be drawn\n", png.c_str());

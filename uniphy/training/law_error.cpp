@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <map>
 
 #include "ops/kernels/law.hpp"
 
@@ -12,12 +14,6 @@ double squared_distance(const double* a, const double* b, std::int64_t count) {
   double sum = 0;
   for (std::int64_t k = 0; k < count; ++k) sum += (a[k] - b[k]) * (a[k] - b[k]);
   return sum;
-}
-
-double median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  const std::size_t n = values.size();
-  return n % 2 ? values[n / 2] : 0.5 * (values[n / 2 - 1] + values[n / 2]);
 }
 
 }  // namespace
@@ -62,20 +58,36 @@ std::vector<LawError> law_errors(const Dataset& data,
   return errors;
 }
 
+double median(std::vector<double> values) {
+  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
+  std::sort(values.begin(), values.end());
+  const std::size_t n = values.size();
+  return n % 2 ? values[n / 2] : 0.5 * (values[n / 2 - 1] + values[n / 2]);
+}
+
+void report_errors(const Dataset& data, const std::vector<double>& values, const std::string& name,
+                   Metrics& metrics) {
+  std::map<std::string, std::vector<double>> of;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    // A NaN has no place in an order.
+    of[data.trajectories[i].material].push_back(
+        std::isfinite(values[i]) ? values[i] : std::numeric_limits<double>::infinity());
+  }
+  for (const auto& [material, list] : of) {
+    metrics.set(name + "." + material, median(list));
+    metrics.set(name + "." + material + ".worst", *std::max_element(list.begin(), list.end()));
+  }
+}
+
 void report_law_errors(const Dataset& data, const std::vector<LawError>& errors,
                        const std::string& prefix, Metrics& metrics) {
-  std::map<std::string, std::vector<double>> stress, projection;
-  for (std::size_t i = 0; i < errors.size(); ++i) {
-    stress[data.trajectories[i].material].push_back(errors[i].stress);
-    projection[data.trajectories[i].material].push_back(errors[i].projection);
+  std::vector<double> stress, projection;
+  for (const LawError& e : errors) {
+    stress.push_back(e.stress);
+    projection.push_back(e.projection);
   }
-  for (const auto& [name, values] :
-       {std::pair{"stress_error", &stress}, std::pair{"projection_error", &projection}})
-    for (const auto& [material, list] : *values) {
-      const std::string key = prefix + name + "." + material;
-      metrics.set(key, median(list));
-      metrics.set(key + ".worst", *std::max_element(list.begin(), list.end()));
-    }
+  report_errors(data, stress, prefix + "stress_error", metrics);
+  report_errors(data, projection, prefix + "projection_error", metrics);
 }
 
 }  // namespace uniphy

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -24,9 +23,16 @@ std::vector<LawError> law_errors(const Dataset& data,
                                  std::shared_ptr<const kernels::LearnedLawWeights> weights,
                                  const std::vector<double>& latents);
 
-/// Sets `<prefix>stress_error.M`, `<prefix>projection_error.M` (medians over the trajectories of
-/// each material M) and the same with `.worst`.
+/// Sets `<name>.M`, the median over the trajectories of each material M, and `<name>.M.worst`.
+/// values: [trajectories]; what is not finite counts as larger than everything.
+void report_errors(const Dataset& data, const std::vector<double>& values, const std::string& name,
+                   Metrics& metrics);
+
+/// report_errors for `<prefix>stress_error` and `<prefix>projection_error`.
 void report_law_errors(const Dataset& data, const std::vector<LawError>& errors,
                        const std::string& prefix, Metrics& metrics);
+
+/// The mean of the middle two where their number is even; NaN of none.
+double median(std::vector<double> values);
 
 }  // namespace uniphy

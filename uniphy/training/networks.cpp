@@ -111,4 +111,11 @@ std::int64_t Networks::parameter_count() const {
   return count;
 }
 
+Networks Networks::frozen() const {
+  Networks n = *this;
+  for (auto* network : {&n.projection, &n.stress})
+    for (LinearLayer& layer : *network) layer = {layer.weight.detach(), layer.bias.detach()};
+  return n;
+}
+
 }  // namespace uniphy

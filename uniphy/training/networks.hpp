@@ -18,8 +18,8 @@ struct NetworkOptions {
   std::int64_t hidden_layers = 3;
   std::int64_t width = 32;
   // Isotropic form: whether the caps and the moduli answer to the state, or to z alone.
-  bool state_caps = true;
-  bool state_moduli = true;
+  bool state_caps = false;
+  bool state_moduli = false;
 };
 
 /// The two networks as leaf tensors (float32) that an optimizer moves.
@@ -34,6 +34,8 @@ struct Networks {
   kernels::LearnedLawWeights weights() const;
   std::vector<torch::Tensor> parameters() const;
   std::int64_t parameter_count() const;
+  /// The same weights, shared, without gradients: a fit of z alone need not pay for theirs.
+  Networks frozen() const;
 };
 
 }  // namespace uniphy

@@ -2,11 +2,15 @@
 
 #include <ATen/CPUGeneratorImpl.h>
 
+#include <chrono>
 #include <cmath>
+#include <optional>
 
 #include "uniphy/report/interrupt.hpp"
 #include "uniphy/report/progress.hpp"
 #include "uniphy/training/batches.hpp"
+#include "uniphy/training/heldout_curve.hpp"
+#include "uniphy/training/initial_latents.hpp"
 #include "uniphy/training/training_checkpoint.hpp"
 
 namespace uniphy {
@@ -17,22 +21,6 @@ using torch::Tensor;
 constexpr std::int64_t kReportEvery = 100;
 constexpr double kCapsFirst = 0.6;  ///< share of the steps with Objective::errors' whole_way
 
-/// z before training. The scale coordinates start at the trajectory's own stress and strain, so
-/// that both networks see numbers near one from the first step; the others start small.
-Tensor initial_latents(const LawColumns& columns, const NetworkOptions& network,
-                       torch::Generator& generator) {
-  const std::int64_t n = std::int64_t(columns.scales.size());
-  Tensor z = torch::randn({n, network.latent_size}, generator, torch::kFloat32) * 0.1;
-  for (std::int64_t i = 0; i < n; ++i) {
-    const TrajectoryScale& s = columns.scales[i];
-    if (s.stress > 0) z[i][0] = std::log(s.stress / kernels::kStressScale) / kernels::kStressRate;
-    if (network.latent_size > 1 && network.form == kernels::LawForm::isotropic && s.strain > 0)
-      z[i][1] = std::log(std::min(std::max(s.strain, 1e-3), 0.5) / kernels::kStrainScale) /
-                kernels::kStrainRate;
-  }
-  return z.requires_grad_();
-}
-
 double cosine(double rate, std::int64_t step, std::int64_t steps) {
   // A short warm-up: AdamW's first steps are as large as the rate whatever the gradient.
   const double warm = std::min(1.0, double(step + 1) / 100.0);
@@ -41,6 +29,21 @@ double cosine(double rate, std::int64_t step, std::int64_t steps) {
 
 void set_rate(torch::optim::Optimizer& optimizer, std::size_t group, double rate) {
   static_cast<torch::optim::AdamWOptions&>(optimizer.param_groups()[group].options()).lr(rate);
+}
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+std::string note_of(const TrainingPoint& p) {
+  char note[128];
+  int length = std::snprintf(note, sizeof note, "loss %.4f, stress %.2e, projection %.2e", p.loss,
+                             p.stress_error, p.projection_error);
+  if (std::isfinite(p.heldout_stress_error)) {
+    length += std::snprintf(note + length, sizeof note - length, ", held out %.2e, %.2e",
+                            p.heldout_stress_error, p.heldout_projection_error);
+  }
+  return {note, note + length};
 }
 
 double median_of(const Tensor& values) { return values.median().item<double>(); }
@@ -60,7 +63,8 @@ torch::optim::AdamW make_optimizer(const Networks& networks, const Tensor& z,
 }  // namespace
 
 TrainingResult train(const Dataset& data, const TrainingOptions& o,
-                     const std::filesystem::path& checkpoint) {
+                     const std::filesystem::path& checkpoint, const Dataset* heldout) {
+  const auto start = std::chrono::steady_clock::now();
   const LawColumns columns = law_columns(data, o.network.form);
   const Objective objective(columns, o.network.form, o.error_floor);
   const BatchSampler sampler(data, o.seed);
@@ -70,8 +74,15 @@ TrainingResult train(const Dataset& data, const TrainingOptions& o,
   result.networks = Networks::random(o.network, generator);
   result.z = initial_latents(columns, o.network, generator);
   torch::optim::AdamW optimizer = make_optimizer(result.networks, result.z, o);
-  TrainingCheckpoint state(checkpoint, data, o, result, optimizer);
+  std::optional<HeldoutCurve> curve;
+  if (heldout) curve.emplace(*heldout, o);
+  TrainingCheckpoint state(checkpoint, data, o, result, optimizer, curve ? &*curve : nullptr);
   std::int64_t step = state.load();
+  const double before = result.seconds;
+  const auto save = [&](std::int64_t at) {
+    result.seconds = before + seconds_since(start);
+    state.save(at);
+  };
   const Tensor all = torch::arange(n);
   const std::vector<Tensor> parameters = result.networks.parameters();
 
@@ -79,7 +90,7 @@ TrainingResult train(const Dataset& data, const TrainingOptions& o,
   Progress progress("train", o.steps, "steps");
   for (; step < o.steps; ++step) {
     if (interrupt_requested()) {
-      state.save(step);
+      save(step);
       throw_if_interrupted();
     }
     set_rate(optimizer, 0, cosine(o.learning_rate, step, o.steps));
@@ -98,20 +109,25 @@ TrainingResult train(const Dataset& data, const TrainingOptions& o,
       result.history.push_back({step, loss.item<double>(),
                                 median_of(errors.stress.detach().mean(1).sqrt()),
                                 median_of(errors.projection.detach().mean(1).sqrt())});
-      const TrainingPoint& p = result.history.back();
-      char note[96];
-      std::snprintf(note, sizeof note, "loss %.4f, stress %.2e, projection %.2e", p.loss,
-                    p.stress_error, p.projection_error);
-      progress.update(step, note);
+      TrainingPoint& p = result.history.back();
+      if (curve) {
+        const double rate = cosine(o.learning_rate * o.latent_rate, step, o.steps);
+        const HeldoutErrors now = curve->follow(result.networks, step, rate);
+        p.heldout_stress_error = now.stress;
+        p.heldout_projection_error = now.projection;
+      }
+      progress.update(step, note_of(p));
     }
-    if ((step + 1) % o.checkpoint_every == 0) state.save(step + 1);
+    if ((step + 1) % o.checkpoint_every == 0) save(step + 1);
   }
   progress.finish();
+  result.seconds = before + seconds_since(start);
   return result;
 }
 
-Tensor fit_latents(const Dataset& data, const Networks& networks, const Tensor& training_z,
+Tensor fit_latents(const Dataset& data, const Networks& trained, const Tensor& training_z,
                    const LatentFitOptions& o) {
+  const Networks networks = trained.frozen();
   const Objective objective(law_columns(data, networks.options.form), networks.options.form,
                             o.error_floor);
   const BatchSampler sampler(data, o.seed);

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -35,19 +36,24 @@ struct TrainingPoint {
   double loss = 0;
   double stress_error = 0;
   double projection_error = 0;
+  /// The same over the held-out set (heldout_curve.hpp), NaN without one.
+  double heldout_stress_error = std::numeric_limits<double>::quiet_NaN();
+  double heldout_projection_error = std::numeric_limits<double>::quiet_NaN();
 };
 
 struct TrainingResult {
   Networks networks;
   torch::Tensor z;  ///< [N, latent_size]
   std::vector<TrainingPoint> history;
+  double seconds = 0;  ///< of training, those before an interruption included
 };
 
 /// Trains, saving `checkpoint` every checkpoint_every steps and at an interrupt; where that file is
 /// there already, it goes on from it, to the same bits as an uninterrupted run. Throws Error where
-/// the checkpoint belongs to other options or other data, Interrupted after saving.
+/// the checkpoint belongs to other options or other data, Interrupted after saving. With `heldout`
+/// the history has held-out curves; networks and codes are the same bits with and without.
 TrainingResult train(const Dataset& data, const TrainingOptions& options,
-                     const std::filesystem::path& checkpoint);
+                     const std::filesystem::path& checkpoint, const Dataset* heldout = nullptr);
 
 /// The auto-decoder's own inference: z alone, fitted to the samples of each trajectory of `data`.
 struct LatentFitOptions {

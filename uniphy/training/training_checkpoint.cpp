@@ -21,55 +21,74 @@ class Hash {
   std::uint64_t value_ = 14695981039346656037ULL;
 };
 
-std::string fingerprint(const Dataset& data, const TrainingOptions& o) {
+constexpr std::int64_t kHistoryColumns = 6;
+
+std::string fingerprint(const Dataset& data, const TrainingOptions& o, HeldoutCurve* heldout) {
   Hash hash;
   hash.add(data.samples.F);
   hash.add(data.samples.F_proj);
   hash.add(data.samples.C);
   hash.add(data.samples.tau);
   hash.add(data.first.data(), data.first.size() * sizeof(data.first[0]));
+  // The first codes of the held-out set follow from its samples.
+  std::string beside;
+  if (heldout) {
+    Hash codes;
+    const torch::Tensor z = heldout->z().detach().contiguous();
+    codes.add(z.data_ptr(), z.nbytes());
+    beside = fmt::format(" heldout {:016x}", codes.value());
+  }
   return fmt::format(
       "{} {} caps {} moduli {} latent {} layers {} width {} seed {} steps {} batch {} rate {} x {} "
-      "decay {} "
-      "sigma {} "
-      "floor {} delta {} clip {} data {:016x}",
+      "decay {} sigma {} floor {} delta {} clip {} data {:016x}{}",
       kernels::form_name(o.network.form), kernels::activation_name(o.network.activation),
       o.network.state_caps, o.network.state_moduli, o.network.latent_size, o.network.hidden_layers,
       o.network.width, o.seed, o.steps, o.batch_per_trajectory, o.learning_rate, o.latent_rate,
-      o.weight_decay, o.latent_sigma, o.error_floor, o.delta, o.clip, hash.value());
+      o.weight_decay, o.latent_sigma, o.error_floor, o.delta, o.clip, hash.value(), beside);
 }
 
 }  // namespace
 
 TrainingCheckpoint::TrainingCheckpoint(std::filesystem::path file, const Dataset& data,
                                        const TrainingOptions& options, TrainingResult& state,
-                                       torch::optim::AdamW& optimizer)
+                                       torch::optim::AdamW& optimizer, HeldoutCurve* heldout)
     : file_(std::move(file)),
-      fingerprint_(fingerprint(data, options)),
+      fingerprint_(fingerprint(data, options, heldout)),
       state_(state),
-      optimizer_(optimizer) {}
+      optimizer_(optimizer),
+      heldout_(heldout) {}
 
 void TrainingCheckpoint::save(std::int64_t step) const {
   torch::serialize::OutputArchive archive;
   archive.write("format", c10::IValue("uniphy-training"));
   archive.write("fingerprint", c10::IValue(fingerprint_));
   archive.write("step", c10::IValue(step));
+  archive.write("seconds", c10::IValue(state_.seconds));
   archive.write("z", state_.z.detach());
   const std::vector<torch::Tensor> parameters = state_.networks.parameters();
   for (std::size_t k = 0; k < parameters.size(); ++k)
     archive.write("parameter_" + std::to_string(k), parameters[k].detach());
-  torch::Tensor history = torch::empty({std::int64_t(state_.history.size()), 4}, torch::kFloat64);
+  torch::Tensor history =
+      torch::empty({std::int64_t(state_.history.size()), kHistoryColumns}, torch::kFloat64);
   double* at = history.data_ptr<double>();
   for (const TrainingPoint& p : state_.history) {
     *at++ = double(p.step);
     *at++ = p.loss;
     *at++ = p.stress_error;
     *at++ = p.projection_error;
+    *at++ = p.heldout_stress_error;
+    *at++ = p.heldout_projection_error;
   }
   archive.write("history", history);
   torch::serialize::OutputArchive moments;
   optimizer_.save(moments);
   archive.write("optimizer", moments);
+  if (heldout_) {
+    archive.write("heldout_z", heldout_->z().detach());
+    torch::serialize::OutputArchive heldout_moments;
+    heldout_->optimizer().save(heldout_moments);
+    archive.write("heldout_optimizer", heldout_moments);
+  }
   const std::filesystem::path temporary = file_.string() + ".tmp";
   try {
     archive.save_to(temporary.string());
@@ -115,14 +134,26 @@ std::int64_t TrainingCheckpoint::load() {
       restore("parameter_" + std::to_string(k), parameters[k]);
     torch::Tensor history;
     archive.read("history", history);
+    if (history.dim() != 2 || history.size(1) != kHistoryColumns) {
+      throw Error("history has another shape");
+    }
     state_.history.clear();
     for (std::int64_t k = 0; k < history.size(0); ++k) {
-      const double* row = history.data_ptr<double>() + 4 * k;
-      state_.history.push_back({std::int64_t(row[0]), row[1], row[2], row[3]});
+      const double* row = history.data_ptr<double>() + kHistoryColumns * k;
+      state_.history.push_back({std::int64_t(row[0]), row[1], row[2], row[3], row[4], row[5]});
     }
     torch::serialize::InputArchive moments;
     archive.read("optimizer", moments);
     optimizer_.load(moments);
+    if (heldout_) {
+      restore("heldout_z", heldout_->z());
+      torch::serialize::InputArchive heldout_moments;
+      archive.read("heldout_optimizer", heldout_moments);
+      heldout_->optimizer().load(heldout_moments);
+    }
+    c10::IValue seconds;
+    archive.read("seconds", seconds);
+    state_.seconds = seconds.toDouble();
   } catch (const std::exception& e) {
     throw Error(file_.string() + ": damaged training checkpoint (" +
                 std::string(e.what()).substr(0, 120) + "); remove it to start anew");

@@ -171,6 +171,51 @@ TEST(Generate, TheFileLeadsBackToItsScenes) {
   EXPECT_THAT(testing::error_of([&] { setup_of(data, 0); }), HasSubstr("config of the data set"));
 }
 
+TEST(GenerateConfig, ReadsBackToTheSameOptions) {
+  for (const char* yaml :
+       {kSmall, "split: heldout_all\nseed: 9\n",
+        "{materials: [sand, newtonian], split: heldout_materials, attempts: 7,"
+        " ranges: {sand: {theta: [0.1, 0.2]}, newtonian: {mu: [60, 70]}},"
+        " simulation: {grid: 24, bound: 4, wall: noslip, gravity: [0, -1, 0.5], dt: auto,"
+        " density: 800}, body: {shapes: [box], heldout_shapes: [gear, pawn], size: [0.1, 0.2]},"
+        " motion: {kinds: [left], speed: [1, 2], impact_over_yield: [1, 2], gap: [0, 0.1],"
+        " angular_speed: [1, 2]}, samples: {every: 3, uniform_share: 0.5, drawn: {share: 0.1,"
+        " step: 0.02, strain: 0.3, beyond: 2, affine: [0.5, 7]}}}"}) {
+    const std::string once = generate_config(options_of(yaml));
+    EXPECT_EQ(generate_config(options_of(once)), once);
+    // Ranges of materials that are not drawn are all that the text may lose.
+    if (std::string(yaml).find("materials: [") != std::string::npos) continue;
+    const Config config = Config::parse(yaml);
+    Section root = config.root();
+    read_generate_options(root);
+    EXPECT_EQ(once, config.resolved());
+  }
+  const GenerateOptions o = options_of(
+      generate_config(options_of("{materials: [sand], ranges: {sand: {theta: [0.1, 0.2]}},"
+                                 " simulation: {dt: auto, gravity: [0, -1, 0.5]}}")));
+  EXPECT_EQ(o.materials.size(), 1u);
+  EXPECT_EQ(o.materials[0].interval[3], (std::array<double, 2>{0.1, 0.2}));
+  EXPECT_FALSE(o.dt);
+  EXPECT_EQ(o.grid.gravity[2], 0.5);
+}
+
+TEST(Generate, ADrawnSetIsKeptUntilAnotherIsAsked) {
+  testing::Scratch scratch;
+  GenerateOptions options = options_of(kSmall);
+  const auto file = scratch.file("d.h5");
+  Metrics drawn, kept;
+  EXPECT_EQ(drawn_dataset(options, file, &drawn).trajectories.size(), 10u);
+  EXPECT_EQ(drawn.find("trajectories"), 10);
+  const std::string bytes = read_text_file(file);
+  drawn_dataset(options, file, &kept);
+  EXPECT_TRUE(kept.entries().empty());
+  EXPECT_TRUE(read_text_file(file) == bytes);
+  options.seed = 5;
+  EXPECT_EQ(drawn_dataset(options, file).trajectories[0].seed, 5);
+  scratch.write("d.h5", "something else");
+  EXPECT_THAT(testing::error_of([&] { drawn_dataset(options, file); }), HasSubstr("d.h5"));
+}
+
 TEST(Generate, GivesUpAfterTheAttempts) {
   testing::Scratch scratch;
   GenerateOptions options = deep_fall();

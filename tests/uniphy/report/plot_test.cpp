@@ -64,6 +64,20 @@ TEST(Plot, ParticlesFillTheirPanels) {
   EXPECT_GT(height, 200u);
 }
 
+TEST(Plot, PointsMayHaveNamesAndColours) {
+  if (!gnuplot_available()) GTEST_SKIP() << "no gnuplot here";
+  const testing::Scratch scratch;
+  Chart chart;
+  chart.log_x = true;
+  chart.colour_label = "value";
+  chart.series.push_back({"named", {1, 2}, {1, 2}, {}, true, {"a \"b\"", "5x10 `c` \\ d"}});
+  chart.series.push_back({"coloured", {1, 2, 3}, {2, 1, 3}, {1, 2, NAN}, true});
+  ::testing::internal::CaptureStderr();
+  EXPECT_TRUE(plot_chart(scratch.file("c.png"), chart));
+  EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
+  EXPECT_EQ(png_size(scratch.file("c.png")), std::make_pair(900u, 600u));
+}
+
 TEST(Plot, CameraLooksTheRightWay) {
   ParticlePicture picture;
   picture.azimuth = 0;
@@ -104,6 +118,11 @@ TEST(Plot, MalformedInputIsAnError) {
       testing::without_directory(
           testing::error_of([&] { plot_chart(scratch.file("c.png"), chart); }), scratch.path()),
       "c.png: series \"s\": expected as many y (and colours) as x (2), found 1 (and 0)");
+  chart.series[0] = {"s", {0, 1}, {1, 2}, {}, true, {"one"}};
+  EXPECT_EQ(
+      testing::without_directory(
+          testing::error_of([&] { plot_chart(scratch.file("c.png"), chart); }), scratch.path()),
+      "c.png: series \"s\": expected as many names as x (2), found 1");
   ParticlePicture picture;
   EXPECT_EQ(testing::without_directory(
                 testing::error_of([&] { plot_particles(scratch.file("p.png"), picture); }),

@@ -11,8 +11,11 @@
 
 #include "ops/kernels/error.hpp"
 #include "ops/kernels/law.hpp"
+#include "uniphy/io/atomic_file.hpp"
+#include "uniphy/report/plot.hpp"
 #include "uniphy/training/law_error.hpp"
 #include "uniphy/training/trainer.hpp"
+#include "uniphy/training/training_report.hpp"
 
 namespace uniphy {
 namespace {
@@ -168,6 +171,67 @@ TEST_F(TrainingTest, ResumesToTheSameBitsOnAnyNumberOfThreads) {
   EXPECT_EQ(whole.history.back().loss, resumed.history.back().loss);
 }
 
+TEST_F(TrainingTest, HeldOutCurvesResumeToTheSameBitsAndChangeNothingElse) {
+  const Dataset data = small_data(50, 2), heldout = small_data(40, 8);
+  TrainingOptions o = small_options();
+  o.steps = 201;  // three reports: 0, 100, 200
+  o.checkpoint_every = 150;
+  const TrainingResult without = train(data, o, directory_ / "without.pt");
+  const TrainingResult whole = train(data, o, directory_ / "whole.pt", &heldout);
+  EXPECT_TRUE(same(whole, without));
+  ASSERT_EQ(whole.history.size(), 3u);
+  for (const TrainingPoint& p : without.history) {
+    EXPECT_TRUE(std::isnan(p.heldout_stress_error));
+    EXPECT_TRUE(std::isnan(p.heldout_projection_error));
+  }
+  for (const TrainingPoint& p : whole.history) EXPECT_TRUE(std::isfinite(p.heldout_stress_error));
+  EXPECT_LT(whole.history.back().heldout_stress_error, whole.history.front().heldout_stress_error);
+  // whole.pt is the state after step 150: codes and moments of the held-out set come from there.
+  const TrainingResult resumed = train(data, o, directory_ / "whole.pt", &heldout);
+  EXPECT_TRUE(same(whole, resumed));
+  ASSERT_EQ(resumed.history.size(), 3u);
+  for (std::size_t k = 0; k < 3; ++k) {
+    EXPECT_EQ(whole.history[k].heldout_stress_error, resumed.history[k].heldout_stress_error);
+    EXPECT_EQ(whole.history[k].heldout_projection_error,
+              resumed.history[k].heldout_projection_error);
+  }
+  EXPECT_GT(resumed.seconds, 0);
+  const auto refused = [&](const std::string& file, const Dataset* set) -> std::string {
+    try {
+      train(data, o, directory_ / file, set);
+    } catch (const Error& e) {
+      return e.what();
+    }
+    return "";
+  };
+  EXPECT_THAT(refused("without.pt", &heldout), ::testing::HasSubstr("belongs to another run"));
+  EXPECT_THAT(refused("whole.pt", nullptr), ::testing::HasSubstr("belongs to another run"));
+  const Dataset other = small_data(40, 9);
+  EXPECT_THAT(refused("whole.pt", &other), ::testing::HasSubstr("belongs to another run"));
+}
+
+TEST_F(TrainingTest, ReportsHaveHeldOutColumnsAndBothPicturesOfTheCodes) {
+  Dataset data = small_data(30, 2);
+  for (std::size_t i = 0; i < data.trajectories.size(); ++i)
+    data.trajectories[i].parameters[0] = 1e3 * double(i + 1);
+  TrainingOptions o = small_options();
+  o.steps = 2;
+  const RunDirectory out(directory_, "", 1);
+  const auto text = [&] { return read_text_file(out.file("history.csv")); };
+  TrainingResult result = train(data, o, directory_ / "a.pt");
+  write_training_curves(out, result.history);
+  EXPECT_THAT(text(), ::testing::StartsWith("step,loss,stress_error,projection_error\n0,"));
+  result = train(data, o, directory_ / "b.pt", &data);
+  write_training_curves(out, result.history);
+  EXPECT_THAT(text(), ::testing::StartsWith("step,loss,stress_error,projection_error,"
+                                            "heldout_stress_error,heldout_projection_error\n0,"));
+  EXPECT_THAT(text(), ::testing::Not(::testing::HasSubstr("nan")));
+  plot_latents(out, result.z, data);
+  if (!gnuplot_available()) GTEST_SKIP() << "no gnuplot here";
+  EXPECT_TRUE(std::filesystem::exists(out.file("latents.png")));
+  EXPECT_TRUE(std::filesystem::exists(out.file("latents_mu.png")));
+}
+
 TEST_F(TrainingTest, RefusesForeignAndDamagedCheckpoints) {
   const Dataset data = small_data(20, 2);
   TrainingOptions o = small_options();
@@ -190,6 +254,22 @@ TEST_F(TrainingTest, RefusesForeignAndDamagedCheckpoints) {
   EXPECT_THAT(message(data), ::testing::HasSubstr("expected a training checkpoint"));
   std::ofstream(file) << "not an archive";
   EXPECT_THAT(message(data), ::testing::HasSubstr("expected a training checkpoint"));
+}
+
+TEST(Errors, MediansByMaterialWithTheWorst) {
+  Dataset data;
+  for (const char* material : {"sand", "elastic", "sand", "sand", "sand", "elastic"}) {
+    data.trajectories.emplace_back();
+    data.trajectories.back().material = material;
+  }
+  Metrics metrics;
+  report_errors(data, {1, 2, 4, std::nan(""), 3, 5}, "e", metrics);
+  EXPECT_EQ(metrics.find("e.elastic"), 3.5);
+  EXPECT_EQ(metrics.find("e.elastic.worst"), 5);
+  // What is not a number is worse than everything.
+  EXPECT_EQ(metrics.find("e.sand"), 3.5);
+  EXPECT_TRUE(std::isinf(*metrics.find("e.sand.worst")));
+  EXPECT_TRUE(std::isnan(median({})));
 }
 
 TEST_F(TrainingTest, FindsTheCodeOfKnownSamples) {

@@ -1,0 +1,86 @@
+// uniphy_ablate, from the configuration to the files, at a tiny size.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "tests/uniphy/evaluation/small_run.hpp"
+#include "uniphy/evaluation/ablation_report.hpp"
+#include "uniphy/evaluation/ablation_stage.hpp"
+
+namespace uniphy {
+namespace {
+
+using ::testing::HasSubstr;
+
+std::string config(const std::string& budget, const std::string& variants) {
+  return "seed: 2\ntrajectories: 2\nheldout_trajectories: 1\nbudget: " + budget +
+         "\nmodel: {width: 8, hidden_layers: 1, latent_size: 4}\n" + testing::kSmallSets +
+         "variants:\n" + variants;
+}
+
+constexpr const char* kTwo =
+    "  - {name: base, group: form}\n"
+    "  - {name: seed, group: form, trajectories: 1, model: {form: seed, width: 6}}\n";
+
+TEST(Ablation, KeepsFinishedVariants) {
+  const testing::Scratch scratch;
+  const std::string yaml = config("{type: steps, steps: 12}", kTwo);
+  const Metrics first = testing::run_stage(ablation_stage, yaml, scratch.file("out"));
+  EXPECT_EQ(first.find("base.steps"), 12);
+  // (3 + 4) 8 + 8 + (8 · 2 + 2) for the caps, (6 + 4) 8 + 8 + (8 · 5 + 5) for the stress.
+  EXPECT_EQ(first.find("base.parameters"), 56 + 8 + 18 + 80 + 8 + 45);
+  for (const char* name : {"law_ns", "train_s", "stress_error", "rollout_error.sand.worst",
+                           "projection_error.newtonian", "rollouts_failed"}) {
+    EXPECT_TRUE(first.find(std::string("seed.") + name)) << name;
+  }
+  EXPECT_GT(*first.find("base.law_ns"), 0);
+  const std::string table = read_text_file(scratch.file("out/ablation.md"));
+  EXPECT_THAT(table, HasSubstr("| base | isotropic | 1 x 8 | 4 | 5 x 2 | 215 | 12 | "));
+  EXPECT_THAT(table, HasSubstr("| seed | seed | 1 x 6 | 4 | 5 x 1 | "));
+  const std::string csv = read_text_file(scratch.file("out/ablation.csv"));
+  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 3);
+
+  // A second run reads what is there, times and all; a variant that was lost is made again, to the
+  // same bits.
+  EXPECT_EQ(testing::run_stage(ablation_stage, yaml, scratch.file("out")).json(), first.json());
+  std::filesystem::remove_all(scratch.file("out/seed"));
+  const Metrics again = testing::run_stage(ablation_stage, yaml, scratch.file("out"), 1);
+  EXPECT_EQ(again.find("base.train_s"), first.find("base.train_s"));
+  EXPECT_EQ(again.find("seed.stress_error"), first.find("seed.stress_error"));
+  EXPECT_EQ(again.find("seed.rollout_error.sand"), first.find("seed.rollout_error.sand"));
+}
+
+TEST(Ablation, OtherSettingsAreNotMixed) {
+  const testing::Scratch scratch;
+  testing::run_stage(ablation_stage,
+                     config("{type: steps, steps: 3}", "  - {name: a, trajectories: 1}\n"),
+                     scratch.file("out"));
+  EXPECT_EQ(testing::without_directory(testing::error_of([&] {
+                                         testing::run_stage(
+                                             ablation_stage,
+                                             config("{type: steps, steps: 4}",
+                                                    "  - {name: a, trajectories: 1}\n"),
+                                             scratch.file("out"));
+                                       }),
+                                       scratch.file("out")),
+            "a: was made with other settings (settings.txt); remove it or choose another --out");
+}
+
+TEST(Ablation, ABudgetOfSecondsBecomesStepsOnce) {
+  const testing::Scratch scratch;
+  const std::string yaml =
+      config("{type: seconds, seconds: 0.5}", "  - {name: a, trajectories: 1}\n");
+  const Metrics first = testing::run_stage(ablation_stage, yaml, scratch.file("out"));
+  EXPECT_GE(*first.find("a.steps"), 1);
+  EXPECT_EQ(std::stod(read_text_file(scratch.file("out/a/steps.txt"))), first.find("a.steps"));
+  // As after an interruption: the number of steps stays.
+  std::filesystem::remove(scratch.file("out/a/metrics.json"));
+  const Metrics again = testing::run_stage(ablation_stage, yaml, scratch.file("out"));
+  EXPECT_EQ(again.find("a.steps"), first.find("a.steps"));
+  EXPECT_EQ(again.find("a.stress_error"), first.find("a.stress_error"));
+}
+
+}  // namespace
+}  // namespace uniphy

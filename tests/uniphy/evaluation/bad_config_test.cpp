@@ -1,0 +1,95 @@
+// What uniphy_evaluate and uniphy_ablate refuse, with the whole message.
+
+#include <gtest/gtest.h>
+
+#include "tests/uniphy/support/scratch.hpp"
+#include "uniphy/evaluation/ablation_stage.hpp"
+#include "uniphy/evaluation/evaluate_stage.hpp"
+
+namespace uniphy {
+namespace {
+
+struct BadConfig {
+  const char* name;
+  RunFunction (*declare)(Section&);
+  const char* yaml;
+  const char* message;
+};
+std::ostream& operator<<(std::ostream& out, const BadConfig& b) { return out << b.name; }
+
+class BadEvaluation : public ::testing::TestWithParam<BadConfig> {};
+
+TEST_P(BadEvaluation, IsRefused) {
+  // @: a file that exists.
+  std::string yaml = GetParam().yaml;
+  const testing::Scratch scratch;
+  const std::string file = scratch.write("there.h5", "").string();
+  for (std::size_t at; (at = yaml.find('@')) != std::string::npos;) yaml.replace(at, 1, file);
+  EXPECT_EQ(testing::without_directory(testing::error_of([&] {
+                                         const Config config = Config::parse(yaml, "c.yaml");
+                                         Section root = config.root();
+                                         GetParam().declare(root);
+                                         config.finish();
+                                       }),
+                                       scratch.path()),
+            GetParam().message);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Evaluate, BadEvaluation,
+    ::testing::Values(
+        BadConfig{"UnknownKind", evaluate_stage, "kind: rollout\n",
+                  "c.yaml:1: kind: expected trajectory or heldout, found \"rollout\""},
+        BadConfig{"NoTrajectory", evaluate_stage, "frames: all\n",
+                  "c.yaml:1: trajectory: required key is missing, expected a path"},
+        BadConfig{"KeyOfTheOtherKind", evaluate_stage,
+                  "kind: heldout\nmodel: '@'\nreference: '@'\n", "c.yaml:3: reference"},
+        BadConfig{"SeedOfATrajectory", evaluate_stage, "trajectory: '@'\nreference: '@'\nseed: 3\n",
+                  "c.yaml:3: seed"},
+        BadConfig{"NoModel", evaluate_stage, "kind: heldout\nmodel: none.h5\n", "c.yaml:2: model"},
+        BadConfig{"NegativeSeed", evaluate_stage, "kind: heldout\nmodel: '@'\nseed: -1\n",
+                  "c.yaml:3: seed"},
+        BadConfig{"NoTrajectories", evaluate_stage, "kind: heldout\nmodel: '@'\ntrajectories: 0\n",
+                  "c.yaml:3: trajectories"},
+        BadConfig{"SplitIsNotFree", evaluate_stage, "kind: heldout\nmodel: '@'\nsplit: train\n",
+                  "c.yaml:3: split"},
+        BadConfig{"NoStarts", evaluate_stage, "kind: heldout\nmodel: '@'\nfit: {starts: 0}\n",
+                  "c.yaml:3: fit.starts"},
+        BadConfig{"NoRest", evaluate_stage, "kind: heldout\nmodel: '@'\nrest: {steps: 0}\n",
+                  "c.yaml:3: rest.steps"},
+        BadConfig{"FewAtRest", evaluate_stage, "kind: heldout\nmodel: '@'\nrest: {particles: 7}\n",
+                  "c.yaml:3: rest.particles"}),
+    [](const auto& info) { return std::string(info.param.name); });
+
+INSTANTIATE_TEST_SUITE_P(
+    Ablate, BadEvaluation,
+    ::testing::Values(
+        BadConfig{"NoVariants", ablation_stage, "seed: 1\n", "c.yaml:1: variants"},
+        BadConfig{"EmptyVariants", ablation_stage, "variants: []\n", "c.yaml:1: variants"},
+        BadConfig{"NoName", ablation_stage, "variants:\n  - {group: a}\n",
+                  "c.yaml:2: variants.0.name"},
+        BadConfig{"NameOfAPath", ablation_stage, "variants:\n  - {name: ../a}\n",
+                  "c.yaml:2: variants.0.name: expected letters, digits, _, - and . (no dot first, "
+                  "not data), found \"../a\""},
+        BadConfig{"NameOfTheData", ablation_stage, "variants:\n  - {name: data}\n",
+                  "c.yaml:2: variants.0.name: expected letters, digits, _, - and . (no dot first, "
+                  "not data), found \"data\""},
+        BadConfig{"SameNames", ablation_stage, "variants:\n  - {name: a}\n  - {name: a}\n",
+                  "c.yaml:3: variants.1.name: expected names that differ, found \"a\" twice"},
+        BadConfig{"StepsOfAVariant", ablation_stage,
+                  "variants:\n  - {name: a, training: {steps: 5}}\n",
+                  "c.yaml:2: variants.0.training.steps"},
+        BadConfig{"UnknownForm", ablation_stage, "variants:\n  - {name: a, model: {form: cubic}}\n",
+                  "c.yaml:2: variants.0.model.form"},
+        BadConfig{"UnknownBudget", ablation_stage,
+                  "budget: {type: hours}\nvariants:\n  - {name: a}\n", "c.yaml:1: budget.type"},
+        BadConfig{"BothBudgets", ablation_stage,
+                  "budget: {type: seconds, seconds: 5, steps: 5}\nvariants:\n  - {name: a}\n",
+                  "c.yaml:1: budget.steps"},
+        BadConfig{"NoTime", ablation_stage,
+                  "budget: {type: seconds, seconds: 0}\nvariants:\n  - {name: a}\n",
+                  "c.yaml:1: budget.seconds"}),
+    [](const auto& info) { return std::string(info.param.name); });
+
+}  // namespace
+}  // namespace uniphy

@@ -1,0 +1,92 @@
+#include "uniphy/evaluation/ablation_options.hpp"
+
+#include <fmt/format.h>
+
+#include <set>
+
+#include "uniphy/training/heldout_fit.hpp"
+#include "uniphy/training/training_options.hpp"
+
+namespace uniphy {
+namespace {
+
+bool is_folder_name(const std::string& name) {
+  const auto plain = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
+           c == '-' || c == '.';
+  };
+  for (const char c : name) {
+    if (!plain(c)) return false;
+  }
+  return !name.empty() && name[0] != '.' && name != "data";
+}
+
+void read_variants(Section& config, const TrainingOptions& base, AblationOptions& o) {
+  std::set<std::string> names;
+  for (Section& s : config.list("variants", "the laws that are compared", at_least(1))) {
+    AblationVariant v;
+    v.name = s.text("name", required, "of the row and of the folder");
+    if (!s.describing() && !is_folder_name(v.name)) {
+      s.fail("name", fmt::format("expected letters, digits, _, - and . (no dot first, not data), "
+                                 "found \"{}\"",
+                                 v.name));
+    }
+    if (!s.describing() && !names.insert(v.name).second) {
+      s.fail("name", fmt::format("expected names that differ, found \"{}\" twice", v.name));
+    }
+    v.group = s.text("group", "", "what is varied: variants of a group share a line of the charts");
+    v.trajectories = s.integer("trajectories", o.draw.trajectories, between(1, 100000), "",
+                               "of each material in the training set");
+    v.training = read_training_options(s, base, false);
+    o.variants.push_back(v);
+  }
+}
+
+}  // namespace
+
+AblationOptions read_ablation_options(Section& config) {
+  AblationOptions o;
+  o.draw.seed = static_cast<std::uint64_t>(
+      config.integer("seed", 1, between(0, 9e15), "", "of the training and the held-out sets"));
+  read_draw_options(config, o.draw);
+  o.heldout_trajectories =
+      config.integer("heldout_trajectories", o.heldout_trajectories, between(1, 100000), "",
+                     "of each material in heldout_all");
+  TrainingOptions base;
+  Section budget = config.section("budget", "of every variant alike");
+  budget.variant("type", std::string("steps"),
+                 {{"steps", "optimizer steps",
+                   [&](Section& s) {
+                     base.steps = s.integer("steps", 6000, at_least(1), "", "of every variant");
+                   }},
+                  {"seconds", "as many steps as a short trial finds room for",
+                   [&](Section& s) {
+                     o.budget_seconds =
+                         s.real("seconds", 180, positive(), "s", "training time of every variant");
+                   }}},
+                 "what is the same for all");
+  base = read_training_options(config, base, false);
+  o.fit = read_latent_fit_options(config);
+  read_variants(config, base, o);
+  return o;
+}
+
+std::string AblationOptions::settings_of(const AblationVariant& v) const {
+  const TrainingOptions& t = v.training;
+  const NetworkOptions& n = t.network;
+  GenerateOptions set = draw;
+  set.trajectories = v.trajectories;
+  return fmt::format(
+             "form {}, activation {}, latent {}, layers {}, width {}\n"
+             "seed {}, batch {}, rate {} x {}, decay {}, sigma {}, floor {}, delta {}, clip {}\n"
+             "budget {}\nfit: starts {}, steps {}, rate {}\nheld out {}\n",
+             kernels::form_name(n.form), kernels::activation_name(n.activation), n.latent_size,
+             n.hidden_layers, n.width, t.seed, t.batch_per_trajectory, t.learning_rate,
+             t.latent_rate, t.weight_decay, t.latent_sigma, t.error_floor, t.delta, t.clip,
+             budget_seconds ? fmt::format("{} s", *budget_seconds)
+                            : fmt::format("{} steps", t.steps),
+             fit.starts, fit.steps, fit.learning_rate, heldout_trajectories) +
+         generate_config(set);
+}
+
+}  // namespace uniphy

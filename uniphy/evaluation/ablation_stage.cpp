@@ -1,0 +1,167 @@
+#include "uniphy/evaluation/ablation_stage.hpp"
+
+#include <ATen/Parallel.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "ops/kernels/error.hpp"
+#include "uniphy/data/generate.hpp"
+#include "uniphy/evaluation/ablation_report.hpp"
+#include "uniphy/evaluation/law_cost.hpp"
+#include "uniphy/evaluation/rollout_error.hpp"
+#include "uniphy/io/atomic_file.hpp"
+#include "uniphy/training/heldout_fit.hpp"
+#include "uniphy/training/training_report.hpp"
+
+namespace uniphy {
+namespace {
+
+/// The trial that a budget of seconds is turned into steps by.
+constexpr std::int64_t kTrialSteps = 40;
+
+struct HeldoutSet {
+  Dataset data;
+  std::vector<TrajectorySetup> setups;
+};
+
+Dataset training_set(const AblationOptions& o, const AblationVariant& v, const RunDirectory& out) {
+  GenerateOptions draw = o.draw;
+  draw.split = Split::train;
+  draw.trajectories = v.trajectories;
+  return drawn_dataset(draw, out.file("data") / fmt::format("train_{}.h5", v.trajectories));
+}
+
+HeldoutSet heldout_set(const AblationOptions& o, const RunDirectory& out) {
+  GenerateOptions draw = o.draw;
+  draw.split = Split::heldout_all;
+  draw.trajectories = o.heldout_trajectories;
+  HeldoutSet set;
+  set.data = drawn_dataset(draw, out.file("data") / "heldout_all.h5");
+  set.setups = setups_of(set.data);
+  return set;
+}
+
+/// Steps that fit in the seconds, measured once and kept: an interrupted training must go on with
+/// the number that it began with.
+std::int64_t steps_for(double seconds, const Dataset& data, const TrainingOptions& training,
+                       const RunDirectory& out) {
+  const std::filesystem::path file = out.file("steps.txt");
+  if (std::filesystem::exists(file)) {
+    const auto steps = parse_integer(read_text_file(file));
+    if (!steps || *steps < 1) throw Error(file.string() + ": expected a number of steps");
+    return *steps;
+  }
+  const auto taken = [&](std::int64_t steps) {
+    TrainingOptions trial = training;
+    trial.steps = steps;
+    trial.checkpoint_every = 2 * steps;
+    const std::filesystem::path scratch = out.file("trial.pt");
+    std::filesystem::remove(scratch);  // of a trial that was interrupted
+    return train(data, trial, scratch).seconds;
+  };
+  // The difference is free of what every training does once.
+  const double few = taken(kTrialSteps / 4), many = taken(kTrialSteps);
+  const double step = std::max(1e-6, (many - few) / (0.75 * kTrialSteps));
+  const auto steps = std::max<std::int64_t>(1, std::llround((seconds - few) / step));
+  write_text_file(file, std::to_string(steps));
+  return steps;
+}
+
+void set_overall(Metrics& metrics, const std::string& name, const std::vector<double>& values,
+                 const Dataset& data) {
+  metrics.set(name, median(values));
+  report_errors(data, values, name, metrics);
+}
+
+Metrics make(const AblationVariant& variant, const AblationOptions& o, const HeldoutSet& heldout,
+             const RunDirectory& all, const RunDirectory& out) {
+  const Dataset data = training_set(o, variant, all);
+  TrainingOptions training = variant.training;
+  if (o.budget_seconds) training.steps = steps_for(*o.budget_seconds, data, training, out);
+  const TrainingResult result = train(data, training, out.file("checkpoint.pt"), &heldout.data);
+  write_model(out.file("model.h5"), model_file(result.networks, result.z, data, out.config_yaml()),
+              true);
+  write_training_curves(out, result.history);
+  Metrics metrics;
+  metrics.set("parameters", double(result.networks.parameter_count()));
+  metrics.set("steps", double(training.steps));
+  metrics.set("train_s", result.seconds);
+
+  const auto weights =
+      std::make_shared<const kernels::LearnedLawWeights>(result.networks.weights());
+  LatentFitOptions fit_options = o.fit;
+  fit_options.error_floor = training.error_floor;
+  fit_options.delta = training.delta;
+  fit_options.latent_sigma = training.latent_sigma;
+  const HeldoutFit fit = fit_heldout(heldout.data, result.networks, result.z, weights, fit_options);
+  const auto laws = learned_laws(weights, fit.latents);
+  metrics.set("law_ns", law_cost(laws.front(), heldout.data));
+  const std::vector<RolloutError> rollouts = rollout_errors(heldout.setups, laws);
+  std::vector<double> stress, projection, rollout;
+  double failed = 0;
+  for (std::size_t i = 0; i < rollouts.size(); ++i) {
+    stress.push_back(fit.errors[i].stress);
+    projection.push_back(fit.errors[i].projection);
+    rollout.push_back(rollouts[i].root_over_size);
+    if (!rollouts[i].failure.empty()) ++failed;
+  }
+  set_overall(metrics, "stress_error", stress, heldout.data);
+  set_overall(metrics, "projection_error", projection, heldout.data);
+  set_overall(metrics, "rollout_error", rollout, heldout.data);
+  metrics.set("rollouts_failed", failed);
+  return metrics;
+}
+
+/// The metrics of a variant: of its folder where it is finished, made anew otherwise.
+Metrics metrics_of(const AblationVariant& variant, const AblationOptions& o,
+                   const HeldoutSet& heldout, const RunDirectory& all) {
+  const std::filesystem::path folder = all.file(variant.name);
+  make_directory(folder);
+  const std::string settings = o.settings_of(variant);
+  const std::filesystem::path record = folder / "settings.txt", done = folder / "metrics.json";
+  if (!std::filesystem::exists(record)) {
+    write_text_file(record, settings);
+  } else if (read_text_file(record) != settings) {
+    throw Error(folder.string() +
+                ": was made with other settings (settings.txt); remove it or choose another --out");
+  }
+  if (std::filesystem::exists(done)) return Metrics::read(done);
+  const RunDirectory out(folder, all.config_yaml(), all.threads());
+  const Metrics metrics = make(variant, o, heldout, all, out);
+  metrics.write(done);  // last: a variant is finished or not
+  return Metrics::read(done);
+}
+
+void run(const AblationOptions& o, RunDirectory& out, Metrics& metrics) {
+  at::set_num_threads(out.threads());
+  make_directory(out.file("data"));
+  const HeldoutSet heldout = heldout_set(o, out);
+  std::vector<std::string> materials;
+  for (const MaterialRanges& ranges : o.draw.materials) materials.push_back(ranges.name());
+  std::vector<AblationRow> rows;
+  for (const AblationVariant& variant : o.variants) {
+    std::fprintf(stderr, "%s (%zu of %zu)\n", variant.name.c_str(), rows.size() + 1,
+                 o.variants.size());
+    rows.push_back({variant, metrics_of(variant, o, heldout, out)});
+    for (const auto& [name, value] : rows.back().metrics.entries()) {
+      metrics.set(variant.name + "." + name, value);
+    }
+    // After each, so that there is something to look at meanwhile.
+    write_text_file(out.file("ablation.md"), ablation_table(rows, materials));
+    write_text_file(out.file("ablation.csv"), ablation_csv(rows));
+  }
+  std::fputs(ablation_table(rows, materials).c_str(), stdout);
+  plot_against_cost(rows, out);
+}
+
+}  // namespace
+
+RunFunction ablation_stage(Section& config) {
+  const AblationOptions o = read_ablation_options(config);
+  return [o](RunDirectory& out, Metrics& metrics) { run(o, out, metrics); };
+}
+
+}  // namespace uniphy

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "uniphy/report/metrics.hpp"
+
+namespace uniphy {
+
+/// A relative error as text: "0.48 %", "0", "fails" where it is not finite.
+std::string percent(double value);
+
+/// A line of a table of errors.
+struct ErrorRow {
+  std::string title;
+  const Metrics* metrics = nullptr;
+  std::string name;  ///< of the metrics: "heldout_materials.stress_error"
+};
+
+/// A Markdown table: a line a row, a column a material M, "median (worst)" from `<name>.M` and
+/// `<name>.M.worst`. A projection error is relative to the change that the law makes; elastic makes
+/// none and has an absolute one, so that entry is a plain number.
+std::string error_table(const std::vector<ErrorRow>& rows,
+                        const std::vector<std::string>& materials);
+
+}  // namespace uniphy
