@@ -67,15 +67,6 @@ T* scratch_of_thread(std::ptrdiff_t size) {
   return buffer.data;
 }
 
-/// Whether the first `features` inputs of a network have no weight.
-bool ignores_state(const MlpWeights& network, int features) {
-  const MlpWeights::Layer& first = network.layers.front();
-  for (int o = 0; o < first.out; ++o)
-    for (int i = 0; i < features; ++i)
-      if (first.weight[std::size_t(o) * first.in + i] != 0) return false;
-  return true;
-}
-
 template <class T>
 class LearnedLawKernel final : public LawKernel<T> {
  public:

@@ -96,6 +96,14 @@ MlpWeights constant_network(int in, const std::vector<double>& bias) {
 
 }  // namespace
 
+bool ignores_state(const MlpWeights& network, int features) {
+  const MlpWeights::Layer& first = network.layers.front();
+  for (int o = 0; o < first.out; ++o)
+    for (int i = 0; i < features; ++i)
+      if (first.weight[std::size_t(o) * first.in + i] != 0) return false;
+  return true;
+}
+
 std::shared_ptr<const LearnedLawWeights> without_projection(const LearnedLawWeights& weights) {
   const auto shape = network_shape(weights.form);
   auto r = std::make_shared<LearnedLawWeights>();

@@ -54,6 +54,9 @@ struct LearnedLawWeights {
   void check() const;
 };
 
+/// Whether the first `features` inputs of a network, those before z, have no weight.
+bool ignores_state(const MlpWeights& network, int features);
+
 /// The same law with G(F) = F to the bit (caps out of reach, or no change), or without its stress
 /// network: the way to ask a law for its stress or its projection alone.
 std::shared_ptr<const LearnedLawWeights> without_projection(const LearnedLawWeights& weights);

@@ -80,6 +80,9 @@ Networks Networks::from_weights(const kernels::LearnedLawWeights& weights) {
   n.options.latent_size = weights.latent_size;
   n.options.hidden_layers = std::int64_t(weights.stress.layers.size()) - 1;
   n.options.width = weights.stress.layers.front().out;
+  const kernels::NetworkShape shape = kernels::network_shape(weights.form);
+  n.options.state_caps = !kernels::ignores_state(weights.projection, shape.projection_in);
+  n.options.state_moduli = !kernels::ignores_state(weights.stress, shape.stress_in);
   n.projection = tensors(weights.projection);
   n.stress = tensors(weights.stress);
   return n;
