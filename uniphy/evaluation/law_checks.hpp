@@ -13,8 +13,9 @@ namespace uniphy {
 /// The largest relative error of a law whose input is turned, F → Q F and C → Q C Qᵀ, over many
 /// states; both parts in float64.
 struct FrameIndifference {
-  /// ‖τ(QF, QCQᵀ) − Q τ(F, C) Qᵀ‖ / max(‖τ‖, 1e-6 of the trajectory's RMS ‖τ‖): at rest there is no
-  /// stress to compare with, and what rounding leaves of zero is no error.
+  /// ‖τ(QF, QCQᵀ) − Q τ(F, C) Qᵀ‖ / max(‖τ‖, 1e-4 of the trajectory's RMS ‖τ‖). The floor is for
+  /// states at rest: QF is rounded, which changes its strain by 1e-16, and a stiff law shows that
+  /// against a stress of next to nothing.
   double stress = 0;
   /// ‖b(QF) − Q b(F) Qᵀ‖ / ‖b‖ of b = F_proj F_projᵀ, the left Cauchy–Green tensor. F_proj itself
   /// is not compared: a law is free in the rotation that it leaves to the right of its stretch (the

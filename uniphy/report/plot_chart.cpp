@@ -21,7 +21,7 @@ bool drawable(double value, bool log) { return std::isfinite(value) && (!log || 
 bool plot_chart(const std::filesystem::path& png, const Chart& chart) {
   std::string data;
   std::string plot;
-  bool coloured = false;
+  bool coloured = false, scattered = false;
   std::size_t colour_index = 0;
   for (std::size_t i = 0; i < chart.series.size(); ++i) {
     const Series& series = chart.series[i];
@@ -49,6 +49,7 @@ bool plot_chart(const std::filesystem::path& png, const Chart& chart) {
                     : "\n";
     }
     if (!any) continue;
+    scattered = scattered || (series.points && !series.label.empty());
     data += fmt::format("$s{} << EOD\n{}EOD\n", i, block);
     const std::string title = series.label.empty()
                                   ? "notitle"
@@ -83,7 +84,9 @@ bool plot_chart(const std::filesystem::path& png, const Chart& chart) {
                         gnuplot_text(chart.x_label), gnuplot_text(chart.y_label));
   script +=
       "set border 3 lc rgb '#444444'\nset tics nomirror\n"
-      "set grid lc rgb '#dddddd' lt 1 lw 0.5\nset key opaque\n";
+      "set grid lc rgb '#dddddd' lt 1 lw 0.5\n";
+  // Points may lie anywhere; a line that passes under the legend shows on both sides of it.
+  script += scattered ? "set key outside right top\n" : "set key opaque\n";
   if (chart.log_x) script += "set logscale x\nset format x '10^{%T}'\n";
   if (chart.log_y) script += "set logscale y\nset format y '10^{%T}'\n";
   if (coloured) {

@@ -38,8 +38,7 @@ HeldoutErrors HeldoutCurve::follow(const Networks& trained, std::int64_t step, d
   const auto errors_at = [&](std::int64_t draw) {
     return objective_.errors(
         networks, z_,
-        sampler_.rows((kStepsAReport + 1) * step + draw, options_.batch_per_trajectory), all,
-        /*whole_way=*/false);
+        sampler_.rows((kStepsAReport + 1) * step + draw, options_.batch_per_trajectory), all);
   };
   static_cast<torch::optim::AdamOptions&>(optimizer_.param_groups()[0].options()).lr(rate);
   for (std::int64_t k = 0; k < kStepsAReport; ++k) {

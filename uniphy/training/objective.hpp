@@ -27,10 +27,11 @@ class Objective {
   Objective(const LawColumns& columns, kernels::LawForm form, double floor);
 
   /// rows: [N, m] sample indices, row i of trajectory scale_rows[i]; z: [N, latent_size].
-  /// `whole_way`: the isotropic form is taken to return to its cap at once, whatever its share says.
-  /// As long as a cap is far off, a share near 0 is the easy way out, and a trap: caps come first.
+  /// `whole_way`: the isotropic form is taken to return to its cap at once, whatever its share
+  /// says. As long as a cap is far off, a share near 0 is the easy way out, and a trap: caps come
+  /// first.
   LawErrors errors(const Networks& networks, const torch::Tensor& z, const torch::Tensor& rows,
-                   const torch::Tensor& scale_rows, bool whole_way) const;
+                   const torch::Tensor& scale_rows, bool whole_way = false) const;
 
   /// mean log(1 + error/δ) of both kinds, a logarithm so that no trajectory drowns the others.
   static torch::Tensor robust_mean(const torch::Tensor& errors, double delta);

@@ -134,7 +134,7 @@ Tensor fit_latents(const Dataset& data, const Networks& trained, const Tensor& t
   const std::int64_t n = sampler.trajectories(), codes = training_z.size(0);
   const std::int64_t starts = std::min(o.starts, codes);
   const auto loss_of = [&](const Tensor& z, const Tensor& rows, const Tensor& of) {
-    const LawErrors e = objective.errors(networks, z, rows, of, /*whole_way=*/false);
+    const LawErrors e = objective.errors(networks, z, rows, of);
     return torch::log1p(e.stress / o.delta).mean(1) + torch::log1p(e.projection / o.delta).mean(1);
   };
   // Which training codes answer best, a code at a time against all trajectories.

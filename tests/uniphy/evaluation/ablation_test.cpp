@@ -49,7 +49,7 @@ TEST(Ablation, KeepsFinishedVariants) {
   const Metrics again = testing::run_stage(ablation_stage, yaml, scratch.file("out"), 1);
   EXPECT_EQ(again.find("base.train_s"), first.find("base.train_s"));
   EXPECT_EQ(again.find("seed.stress_error"), first.find("seed.stress_error"));
-  EXPECT_EQ(again.find("seed.rollout_error.sand"), first.find("seed.rollout_error.sand"));
+  EXPECT_EQ(again.find("seed.rollouts_failed"), first.find("seed.rollouts_failed"));
 }
 
 TEST(Ablation, OtherSettingsAreNotMixed) {

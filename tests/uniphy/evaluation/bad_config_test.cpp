@@ -39,35 +39,43 @@ INSTANTIATE_TEST_SUITE_P(
     Evaluate, BadEvaluation,
     ::testing::Values(
         BadConfig{"UnknownKind", evaluate_stage, "kind: rollout\n",
-                  "c.yaml:1: kind: expected trajectory or heldout, found \"rollout\""},
+                  "c.yaml:1: kind: expected one of trajectory, heldout, found \"rollout\""},
         BadConfig{"NoTrajectory", evaluate_stage, "frames: all\n",
-                  "c.yaml:1: trajectory: required key is missing, expected a path"},
-        BadConfig{"KeyOfTheOtherKind", evaluate_stage,
-                  "kind: heldout\nmodel: '@'\nreference: '@'\n", "c.yaml:3: reference"},
-        BadConfig{"SeedOfATrajectory", evaluate_stage, "trajectory: '@'\nreference: '@'\nseed: 3\n",
-                  "c.yaml:3: seed"},
-        BadConfig{"NoModel", evaluate_stage, "kind: heldout\nmodel: none.h5\n", "c.yaml:2: model"},
+                  "c.yaml:1: trajectory: required key is missing, expected a file"},
+        BadConfig{
+            "KeyOfTheOtherKind", evaluate_stage, "kind: heldout\nmodel: '@'\nreference: '@'\n",
+            "c.yaml:3: reference: unknown key; known keys here: kind, seed, model, trajectories, "
+            "attempts, materials, ranges, simulation, body, motion, samples, fit, rest"},
+        BadConfig{
+            "SeedOfATrajectory", evaluate_stage, "trajectory: '@'\nreference: '@'\nseed: 3\n",
+            "c.yaml:3: seed: unknown key; known keys here: kind, trajectory, reference, frames"},
+        BadConfig{"NoModel", evaluate_stage, "kind: heldout\nmodel: none.h5\n",
+                  "c.yaml:2: model: expected a file, found \"none.h5\", which does not exist"},
         BadConfig{"NegativeSeed", evaluate_stage, "kind: heldout\nmodel: '@'\nseed: -1\n",
-                  "c.yaml:3: seed"},
+                  "c.yaml:3: seed: expected an integer in [0, 9e+15], found \"-1\""},
         BadConfig{"NoTrajectories", evaluate_stage, "kind: heldout\nmodel: '@'\ntrajectories: 0\n",
-                  "c.yaml:3: trajectories"},
+                  "c.yaml:3: trajectories: expected an integer in [1, 100000], found \"0\""},
         BadConfig{"SplitIsNotFree", evaluate_stage, "kind: heldout\nmodel: '@'\nsplit: train\n",
-                  "c.yaml:3: split"},
+                  "c.yaml:3: split: unknown key; known keys here: kind, seed, model, trajectories, "
+                  "attempts, materials, ranges, simulation, body, motion, samples, fit, rest"},
         BadConfig{"NoStarts", evaluate_stage, "kind: heldout\nmodel: '@'\nfit: {starts: 0}\n",
-                  "c.yaml:3: fit.starts"},
+                  "c.yaml:3: fit.starts: expected an integer in [1, 64], found \"0\""},
         BadConfig{"NoRest", evaluate_stage, "kind: heldout\nmodel: '@'\nrest: {steps: 0}\n",
-                  "c.yaml:3: rest.steps"},
+                  "c.yaml:3: rest.steps: expected an integer >= 1, found \"0\""},
         BadConfig{"FewAtRest", evaluate_stage, "kind: heldout\nmodel: '@'\nrest: {particles: 7}\n",
-                  "c.yaml:3: rest.particles"}),
+                  "c.yaml:3: rest.particles: expected an integer in [8, 100000], found \"7\""}),
     [](const auto& info) { return std::string(info.param.name); });
 
 INSTANTIATE_TEST_SUITE_P(
     Ablate, BadEvaluation,
     ::testing::Values(
-        BadConfig{"NoVariants", ablation_stage, "seed: 1\n", "c.yaml:1: variants"},
-        BadConfig{"EmptyVariants", ablation_stage, "variants: []\n", "c.yaml:1: variants"},
+        BadConfig{
+            "NoVariants", ablation_stage, "seed: 1\n",
+            "c.yaml:1: variants: required key is missing, expected a list of maps, at least 1"},
+        BadConfig{"EmptyVariants", ablation_stage, "variants: []\n",
+                  "c.yaml:1: variants: expected a list of maps, at least 1, found a list of 0"},
         BadConfig{"NoName", ablation_stage, "variants:\n  - {group: a}\n",
-                  "c.yaml:2: variants.0.name"},
+                  "c.yaml:2: variants.0.name: required key is missing, expected a text"},
         BadConfig{"NameOfAPath", ablation_stage, "variants:\n  - {name: ../a}\n",
                   "c.yaml:2: variants.0.name: expected letters, digits, _, - and . (no dot first, "
                   "not data), found \"../a\""},
@@ -78,17 +86,21 @@ INSTANTIATE_TEST_SUITE_P(
                   "c.yaml:3: variants.1.name: expected names that differ, found \"a\" twice"},
         BadConfig{"StepsOfAVariant", ablation_stage,
                   "variants:\n  - {name: a, training: {steps: 5}}\n",
-                  "c.yaml:2: variants.0.training.steps"},
-        BadConfig{"UnknownForm", ablation_stage, "variants:\n  - {name: a, model: {form: cubic}}\n",
-                  "c.yaml:2: variants.0.model.form"},
+                  "c.yaml:2: variants.0.training.steps: unknown key; known keys here: seed, "
+                  "batch_per_trajectory, learning_rate, latent_rate, weight_decay, latent_sigma, "
+                  "error_floor, delta, clip, checkpoint_every"},
+        BadConfig{
+            "UnknownForm", ablation_stage, "variants:\n  - {name: a, model: {form: cubic}}\n",
+            "c.yaml:2: variants.0.model.form: expected one of isotropic, seed, found \"cubic\""},
         BadConfig{"UnknownBudget", ablation_stage,
-                  "budget: {type: hours}\nvariants:\n  - {name: a}\n", "c.yaml:1: budget.type"},
+                  "budget: {type: hours}\nvariants:\n  - {name: a}\n",
+                  "c.yaml:1: budget.type: expected one of steps, seconds, found \"hours\""},
         BadConfig{"BothBudgets", ablation_stage,
                   "budget: {type: seconds, seconds: 5, steps: 5}\nvariants:\n  - {name: a}\n",
-                  "c.yaml:1: budget.steps"},
+                  "c.yaml:1: budget.steps: unknown key; known keys here: type, seconds"},
         BadConfig{"NoTime", ablation_stage,
                   "budget: {type: seconds, seconds: 0}\nvariants:\n  - {name: a}\n",
-                  "c.yaml:1: budget.seconds"}),
+                  "c.yaml:1: budget.seconds: expected a finite number > 0 (s), found \"0\""}),
     [](const auto& info) { return std::string(info.param.name); });
 
 }  // namespace

@@ -109,7 +109,8 @@ TEST(RestDrift, ShowsALawThatPushesAndOneThatBursts) {
   options.steps = 20;
   options.particles = 27;
   kernels::LawDescription pushes = random_law(kernels::LawForm::seed), bursts = pushes;
-  bursts.z[0] = 5;  // 1e10 Pa
+  pushes.z[0] = -3;  // 1 Pa
+  bursts.z[0] = 5;   // 1e10 Pa
   ::testing::internal::CaptureStderr();
   const std::vector<double> drifts =
       rest_drifts({random_law(kernels::LawForm::isotropic), pushes, bursts}, options);

@@ -12,16 +12,19 @@
 
 namespace uniphy::testing {
 
-/// Sets that take a fraction of a second.
+/// Sets that take a fraction of a second: bodies that start at a wall and are hit at once.
 inline constexpr const char* kSmallSets =
     "simulation: {steps: 60, particles: 40}\n"
+    "motion: {gap: [0, 0], speed: [3, 5]}\n"
     "samples: {per_trajectory: 60}\n"
     "fit: {starts: 2, steps: 5}\n";
 
 /// The options of a small set.
 inline GenerateOptions small_set(const std::string& more = "") {
   const Config config = Config::parse(
-      "trajectories: 1\nsimulation: {steps: 60, particles: 40}\nsamples: {per_trajectory: 60}\n" +
+      "trajectories: 1\nsimulation: {steps: 60, particles: 40}\nmotion: {gap: [0, 0], speed: [3, "
+      "5]}\n"
+      "samples: {per_trajectory: 60}\n" +
       more);
   Section root = config.root();
   return read_generate_options(root);
