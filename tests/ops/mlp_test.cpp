@@ -87,7 +87,7 @@ TEST(Mlp, UndefinedGradientsStayUndefined) {
 }
 
 TEST(Mlp, FrozenWeightsLeaveTheGradientOfTheInputAsItIs) {
-  auto l = layers({11, 32, 5}, torch::kFloat32);
+  auto l = network_layers({11, 32, 5}, torch::kFloat32);
   const Tensor x = torch::randn({300, 11}).requires_grad_();
   const auto gradient = [&] {
     const Tensor y = mlp(x, l, kernels::Activation::silu);

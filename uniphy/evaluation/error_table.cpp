@@ -17,7 +17,9 @@ std::string plain(double value) {
 
 std::string percent(double value) {
   if (!std::isfinite(value)) return "fails";
-  return value == 0 ? "0" : fmt::format("{:.2g} %", 100 * value);
+  if (value == 0) return "0";
+  return value < 0.995 ? fmt::format("{:.2g} %", 100 * value)
+                       : fmt::format("{:.0f} %", 100 * value);
 }
 
 std::string error_table(const std::vector<ErrorRow>& rows,

@@ -18,7 +18,7 @@ using Matrix = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 using Map = Eigen::Map<Matrix>;
 using ConstMap = Eigen::Map<const Matrix>;
 
-constexpr double kStressFloor = 1e-4;  ///< of the trajectory's RMS, see FrameIndifference
+constexpr double kStressFloor = 1e-2;  ///< of the trajectory's RMS, see FrameIndifference
 
 void raise(double& worst, double value) {
   if (!std::isnan(worst) && !(value <= worst)) worst = value;

@@ -13,7 +13,7 @@ namespace uniphy {
 /// The largest relative error of a law whose input is turned, F → Q F and C → Q C Qᵀ, over many
 /// states; both parts in float64.
 struct FrameIndifference {
-  /// ‖τ(QF, QCQᵀ) − Q τ(F, C) Qᵀ‖ / max(‖τ‖, 1e-4 of the trajectory's RMS ‖τ‖). The floor is for
+  /// ‖τ(QF, QCQᵀ) − Q τ(F, C) Qᵀ‖ / max(‖τ‖, 1e-2 of the trajectory's RMS ‖τ‖). The floor is for
   /// states at rest: QF is rounded, which changes its strain by 1e-16, and a stiff law shows that
   /// against a stress of next to nothing.
   double stress = 0;

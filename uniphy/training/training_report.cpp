@@ -11,7 +11,11 @@ namespace uniphy {
 
 void write_training_curves(const RunDirectory& out, const std::vector<TrainingPoint>& history) {
   const bool heldout = !history.empty() && std::isfinite(history.back().heldout_stress_error);
-  const auto line = [](const char* label) { return Series{label, {}, {}, {}, false}; };
+  const auto line = [](const char* label) {
+    Series series;
+    series.label = label;
+    return series;
+  };
   std::vector<Series> curves{line("loss"), line("stress error"), line("projection error")};
   std::string csv = "step,loss,stress_error,projection_error";
   if (heldout) {
@@ -56,12 +60,15 @@ void plot_latents(const RunDirectory& out, const torch::Tensor& z, const Dataset
     chart->y_label = "second";
   }
   by_mu.colour_label = "log10 of mu in Pa (newtonian: viscosity in Pa s)";
-  by_mu.series.push_back({"", {}, {}, {}, true});
+  by_mu.series.emplace_back();
+  by_mu.series.back().points = true;
   Series& all = by_mu.series.back();
   for (std::size_t i = 0; i < data.trajectories.size(); ++i) {
     const TrajectoryRecord& record = data.trajectories[i];
     if (by_material.series.empty() || by_material.series.back().label != record.material) {
-      by_material.series.push_back({record.material, {}, {}, {}, true});
+      by_material.series.emplace_back();
+      by_material.series.back().label = record.material;
+      by_material.series.back().points = true;
     }
     for (Series* series : {&by_material.series.back(), &all}) {
       series->x.push_back(at[2 * i + 1]);

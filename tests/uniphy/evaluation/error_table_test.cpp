@@ -11,7 +11,9 @@ namespace {
 TEST(ErrorTable, PercentKeepsTwoFigures) {
   EXPECT_EQ(percent(0), "0");
   EXPECT_EQ(percent(0.004821), "0.48 %");
-  EXPECT_EQ(percent(1.5), "1.5e+02 %");
+  EXPECT_EQ(percent(0.994), "99 %");
+  EXPECT_EQ(percent(0.996), "100 %");
+  EXPECT_EQ(percent(3.456), "346 %");
   EXPECT_EQ(percent(std::nan("")), "fails");
   EXPECT_EQ(percent(std::numeric_limits<double>::infinity()), "fails");
 }

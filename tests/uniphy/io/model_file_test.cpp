@@ -97,7 +97,7 @@ TEST(ModelFile, WeightsThatDoNotFitAreNotWritten) {
        [](ModelFile& m) { m.weights.projection.layers[0].in = 8; }},
       {"stress/layer_1: expected 6 inputs, found 5",
        [](ModelFile& m) { m.weights.stress.layers[1].in = 5; }},
-      {"stress/layer_2: expected 5 outputs, found 3",
+      {"stress/layer_2: expected 8 outputs, found 3",
        [](ModelFile& m) { m.weights.stress.layers[2].out = 3; }},
       {"stress/layer_0/weight: expected 60 numbers, found 59",
        [](ModelFile& m) { m.weights.stress.layers[0].weight.pop_back(); }},
@@ -202,7 +202,7 @@ TEST(ModelFile, MalformedFilesAreRefused) {
   EXPECT_EQ(message_of([](Layout& l) { l.stress_in = 9; }),
             "m.h5: weights: stress/layer_0: expected 8 inputs (features and latent), found 9");
   EXPECT_EQ(message_of([](Layout& l) { l.bias_size = 1; }),
-            "m.h5: /stress/layer_0/bias: expected the shape [5], found [1]");
+            "m.h5: /stress/layer_0/bias: expected the shape [8], found [1]");
   EXPECT_EQ(message_of([](Layout& l) { l.weight = std::nan(""); }),
             "m.h5: /stress/layer_0/weight: expected finite numbers, found nan at position 0");
   EXPECT_EQ(message_of([](Layout& l) { l.layer_name = "layer_1"; }),
