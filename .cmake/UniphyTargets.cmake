@@ -46,9 +46,14 @@ function(uniphy_test)
   if(arg_TORCH)
     uniphy_use_torch_pch(${arg_NAME})
   endif()
+  # Instrumented loops over lanes are about fifty times slower.
+  set(timeout 300)
+  if(UNIPHY_SANITIZE)
+    set(timeout 1800)
+  endif()
   # CTest runs tests side by side: threads that spin while they wait would slow the neighbours.
   gtest_discover_tests(${arg_NAME} DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60 NO_PRETTY_VALUES
-    PROPERTIES ENVIRONMENT "OMP_WAIT_POLICY=passive" TIMEOUT 300)
+    PROPERTIES ENVIRONMENT "OMP_WAIT_POLICY=passive" TIMEOUT ${timeout})
 endfunction()
 
 # One precompiled torch/torch.h (20 s per translation unit without it) for every target that
