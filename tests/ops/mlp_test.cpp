@@ -43,6 +43,17 @@ TEST_P(MlpTest, GradientsAgreeWithCentralDifferences) {
   EXPECT_LE(errors.biases, 1e-8);
 }
 
+TEST_P(MlpTest, PlainVersionStandsInWhileAskedFor) {
+  const auto l = network_layers({11, 20, 5}, torch::kFloat32);
+  const Tensor x = torch::randn({70, 11});
+  const Tensor fused = mlp(x, l, GetParam()), expected = mlp_reference(x, l, GetParam());
+  {
+    const PlainMlp plain;
+    EXPECT_TRUE(torch::equal(mlp(x, l, GetParam()), expected));
+  }
+  EXPECT_TRUE(torch::equal(mlp(x, l, GetParam()), fused));
+}
+
 TEST_P(MlpTest, SameBitsOnOneThreadAndTwo) {
   const auto l = network_layers({11, 32, 32, 5}, torch::kFloat32);
   const Tensor x = torch::randn({3001, 11}).requires_grad_();

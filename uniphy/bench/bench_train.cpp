@@ -1,0 +1,110 @@
+#include <torch/torch.h>
+
+#include <random>
+
+#include "ops/mlp.hpp"
+#include "uniphy/bench/subjects.hpp"
+#include "uniphy/data/material_ranges.hpp"
+#include "uniphy/training/batches.hpp"
+#include "uniphy/training/objective.hpp"
+
+namespace uniphy::bench {
+namespace {
+
+using torch::Tensor;
+
+/// Random states of the five materials, and what their laws answer.
+Dataset make_dataset(std::int64_t trajectories, std::int64_t samples) {
+  Dataset data;
+  std::mt19937 random(6);
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> unit(0, 1);
+  const auto& ranges = default_material_ranges();
+  data.first.push_back(0);
+  for (std::int64_t i = 0; i < trajectories; ++i) {
+    const MaterialRanges& range = ranges[static_cast<std::size_t>(i) % ranges.size()];
+    std::array<double, 5> point{};
+    for (double& u : point) u = unit(random);
+    const auto law = kernels::make_law<double>(material_at(range, point));
+    std::vector<double> F(9 * samples), C(9 * samples), F_proj(9 * samples), tau(9 * samples);
+    for (std::size_t k = 0; k < F.size(); ++k) {
+      F[k] = (k % 9 % 4 == 0 ? 1 : 0) + 0.05 * normal(random);
+      C[k] = normal(random);
+    }
+    law->evaluate(samples, 5e-4, {F.data(), 9, 1}, {C.data(), 9, 1}, {F_proj.data(), 9, 1},
+                  {tau.data(), 9, 1});
+    TrajectoryRecord record;
+    record.material = range.name();
+    data.trajectories.push_back(record);
+    data.trajectory.insert(data.trajectory.end(), samples, static_cast<std::int32_t>(i));
+    data.first.push_back(data.first.back() + samples);
+    const auto append = [](std::vector<double>& to, const std::vector<double>& from) {
+      to.insert(to.end(), from.begin(), from.end());
+    };
+    append(data.samples.F, F);
+    append(data.samples.F_proj, F_proj);
+    append(data.samples.C, C);
+    append(data.samples.tau, tau);
+  }
+  return data;
+}
+
+/// What a step of Algorithm 1 does, as in training/trainer.cpp.
+struct Training {
+  Training(const Dataset& data, std::int64_t batch)
+      : objective(law_columns(data, kernels::LawForm::isotropic), kernels::LawForm::isotropic, 0.1),
+        sampler(data, 1),
+        batch(batch) {
+    torch::Generator generator = torch::make_generator<at::CPUGeneratorImpl>(1);
+    NetworkOptions size;
+    size.state_caps = size.state_moduli = true;  // networks that are asked for every sample
+    networks = Networks::random(size, generator);
+    const std::int64_t n = sampler.trajectories();
+    z = (0.1 * torch::randn({n, networks.options.latent_size}, generator, torch::kFloat32))
+            .requires_grad_();
+    all = torch::arange(n);
+    parameters = networks.parameters();
+    std::vector<Tensor> moved = parameters;
+    moved.push_back(z);
+    // A rate at which nothing moves: every step is the same work.
+    optimizer = std::make_unique<torch::optim::AdamW>(moved, torch::optim::AdamWOptions(1e-9));
+  }
+
+  void step() {
+    optimizer->zero_grad();
+    const LawErrors errors = objective.errors(networks, z, sampler.rows(0, batch), all);
+    const Tensor loss = Objective::robust_mean(errors.stress, 1e-3) +
+                        Objective::robust_mean(errors.projection, 1e-3) +
+                        z.pow(2).sum(1).mean() * 1e-4;
+    loss.backward();
+    torch::nn::utils::clip_grad_norm_(parameters, 1);
+    optimizer->step();
+  }
+
+  Objective objective;
+  BatchSampler sampler;
+  std::int64_t batch;
+  Networks networks;
+  Tensor z, all;
+  std::vector<Tensor> parameters;
+  std::unique_ptr<torch::optim::AdamW> optimizer;
+};
+
+}  // namespace
+
+void bench_train(const BenchOptions& options, int threads, BenchReport& report) {
+  const std::int64_t batch = options.train_batch;
+  Training training(make_dataset(options.train_trajectories, 2 * batch), batch);
+  Measurer measurer(threads);
+  measurer.add("step", [&] { training.step(); });
+  measurer.add_baseline("step", [&] {
+    const ops::PlainMlp plain;
+    training.step();
+  });
+  measurer.run(options.effort);
+  const std::int64_t samples = options.train_trajectories * batch;
+  report.rows.push_back(
+      make_row(measurer, "step", "train isotropic", "both", samples, static_cast<double>(samples)));
+}
+
+}  // namespace uniphy::bench

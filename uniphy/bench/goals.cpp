@@ -1,0 +1,123 @@
+#include "uniphy/bench/goals.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace uniphy::bench {
+namespace {
+
+constexpr std::int64_t kManyParticles = 10000;  ///< from here on a second core must help
+constexpr const char* kPasses[] = {"forward", "backward"};
+
+struct Extremes {
+  double low = kNone, high = kNone;
+  void add(double value) {
+    if (!(value >= low)) low = value;
+    if (!(value <= high)) high = value;
+  }
+};
+
+void add_learned(const BenchReport& report, std::vector<Goal>& goals) {
+  Extremes share, back, speedup, over_seed;
+  for (const BenchRow* forward : report.all("learned seed", "forward")) {
+    const BenchRow* backward = report.find("learned seed", "backward", forward->particles);
+    share.add(forward->flops / forward->one / 1e9 / report.machine.fma_core);
+    back.add(backward->one / forward->one);
+    for (const BenchRow* seed : {forward, backward}) {
+      speedup.add(seed->speedup());
+      const BenchRow* isotropic = report.find("learned isotropic", seed->pass, seed->particles);
+      over_seed.add(seed->one / isotropic->one);
+    }
+  }
+  goals.push_back({"law_seed_fwd_peak_share", "learned law, seed 4x128: share of FMA rate",
+                   share.low, 0.6, false});
+  goals.push_back({"law_seed_bwd_over_fwd", "  backward over forward", back.high, 2.5, true});
+  goals.push_back({"law_seed_speedup", "  over plain tensors", speedup.low, 5, false});
+  goals.push_back({"law_isotropic_over_seed", "learned law, isotropic 3x32: speed over seed size",
+                   over_seed.low, 10, false});
+}
+
+void add_epochs(const BenchReport& report, std::vector<Goal>& goals) {
+  const auto add = [&](const char* form, double seconds, double mb) {
+    const BenchRow* row = report.all(std::string("epoch ") + form, "both").front();
+    goals.push_back({fmt::format("epoch_{}_s", form),
+                     fmt::format("epoch of Algorithm 2, {}: s on all threads", form), row->all,
+                     seconds, true});
+    goals.push_back(
+        {fmt::format("epoch_{}_mb", form), "  peak extra memory, MB", row->memory_mb, mb, true});
+  };
+  add("seed", 6, 300);
+  add("isotropic", 1, 200);
+}
+
+/// Largest cost of a particle-step over the smallest one, on one thread.
+double spread(const BenchReport& report) {
+  Extremes ratio;
+  for (const char* pass : kPasses) {
+    Extremes cost;
+    for (const BenchRow* row : report.all("mpm step", pass)) cost.add(row->one);
+    ratio.add(cost.high / cost.low);
+  }
+  return ratio.high;
+}
+
+}  // namespace
+
+std::vector<Goal> goals(const BenchReport& report, const BenchOptions& options) {
+  std::vector<Goal> g;
+  g.push_back({"fma_gflops_core", "multiply-adds of one core, Gflop/s", report.machine.fma_core,
+               kNone, false});
+  if (options.measures("svd")) {
+    const BenchRow& svd = *report.find("svd3 f32", "forward", options.svd_matrices);
+    g.push_back({"svd3_f32_ns", "3x3 SVD, ns a matrix", svd.one * 1e9, 60, true});
+    g.push_back({"svd3_f32_speedup", "  over torch::linalg_svd", svd.speedup(), 40, false});
+  }
+  if (options.measures("mpm")) {
+    const std::int64_t n = options.mpm_goal_particles;
+    const BenchRow& forward = *report.find("mpm step", "forward", n);
+    const BenchRow& backward = *report.find("mpm step", "backward", n);
+    g.push_back({"mpm_step_f32_fwd_ns", "P2G + grid + G2P, ns a particle-step forward",
+                 forward.one * 1e9, 120, true});
+    g.push_back({"mpm_step_f32_bwd_ns", "  backward", backward.one * 1e9, 250, true});
+    g.push_back({"mpm_step_speedup", "  over plain tensors",
+                 std::min(forward.speedup(), backward.speedup()), 20, false});
+  }
+  if (options.measures("learned")) add_learned(report, g);
+  if (options.measures("epoch")) add_epochs(report, g);
+  Extremes gain;
+  for (const BenchRow& row : report.rows) {
+    if (row.particles >= kManyParticles) gain.add(row.second_core());
+  }
+  if (std::isfinite(gain.low)) {
+    g.push_back(
+        {"second_core_min", "second core, least gain from 1e4 particles on", gain.low, 1.7, false});
+  }
+  if (options.measures("mpm")) {
+    g.push_back({"per_particle_spread", "cost of a particle-step, largest size over smallest",
+                 spread(report), 1.5, true});
+  }
+  if (options.measures("train")) {
+    const BenchRow& train = *report.all("train isotropic", "both").front();
+    g.push_back(
+        {"train_speedup", "training, samples/s over plain tensors", train.speedup(), 5, false});
+  }
+  return g;
+}
+
+std::string goals_table(const std::vector<Goal>& goals) {
+  std::string text = fmt::format("{:<50} {:>10} {:>10}  {}\n", "work", "goal", "measured", "");
+  for (const Goal& goal : goals) {
+    const bool bound = std::isfinite(goal.bound);
+    text += fmt::format("{:<50} {:>10} {:>10}  {}\n", goal.work,
+                        bound ? fmt::format("{} {:g}", goal.at_most ? "<=" : ">=", goal.bound) : "",
+                        fmt::format("{:.4g}", goal.measured),
+                        !bound          ? ""
+                        : goal.passes() ? "pass"
+                                        : "short");
+  }
+  return text;
+}
+
+}  // namespace uniphy::bench

@@ -1,0 +1,46 @@
+#include "uniphy/bench/roofline.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace uniphy::bench {
+
+Chart roofline(const BenchReport& report) {
+  const Machine& m = report.machine;
+  Chart chart;
+  chart.title = fmt::format("Roofline of one core ({}, float32)", m.isa);
+  chart.x_label = "arithmetic intensity, flop/byte of what must be read and written";
+  chart.y_label = "Gflop/s";
+  chart.log_x = chart.log_y = true;
+  chart.width = 1100;
+  chart.height = 700;
+  const double ridge = m.fma_core / m.copy_core;
+  chart.series.push_back({fmt::format("copy bandwidth, {:.0f} GB/s", m.copy_core),
+                          {0.5, ridge},
+                          {0.5 * m.copy_core, m.fma_core},
+                          {},
+                          false});
+  chart.series.push_back({fmt::format("multiply-adds, {:.0f} Gflop/s", m.fma_core),
+                          {ridge, std::max(4 * ridge, 4000.0)},
+                          {m.fma_core, m.fma_core},
+                          {},
+                          false});
+  // One series for each kind of work, its passes and sizes as points.
+  for (const BenchRow& row : report.rows) {
+    if (!std::isfinite(row.flops) || !std::isfinite(row.bytes) || row.work == "svd3 f64") continue;
+    const std::string label = row.work + ", " + row.pass;
+    auto at = std::find_if(chart.series.begin(), chart.series.end(),
+                           [&](const Series& s) { return s.label == label; });
+    if (at == chart.series.end()) {
+      chart.series.push_back({label, {}, {}, {}, true});
+      at = chart.series.end() - 1;
+    }
+    at->x.push_back(row.flops / row.bytes);
+    at->y.push_back(row.flops / row.one / 1e9);
+  }
+  return chart;
+}
+
+}  // namespace uniphy::bench
