@@ -67,6 +67,35 @@ T* scratch_of_thread(std::ptrdiff_t size) {
   return buffer.data;
 }
 
+/// The kernels read planes of a tile, [9, kTile], straight from memory; from rows they would pick
+/// number by number into vectors that then wait for the last of them. So rows are turned into
+/// planes tile by tile, in memory that stays in the cache.
+template <class T>
+View<const T> planes_of(View<const T> from, std::ptrdiff_t count, T* copy) {
+  if (!from || from.particle_stride == 1) return from;
+  for (std::ptrdiff_t p = 0; p < count; ++p)
+    for (int k = 0; k < 9; ++k) copy[k * kTile + p] = from(p, k);
+  return {copy, 1, kTile};
+}
+/// Where the kernels write what belongs into `to`; finish() brings it there.
+template <class T>
+class PlaneOutput {
+ public:
+  PlaneOutput(View<T> to, T* copy) : to_(to), copy_(copy) {}
+  bool direct() const { return !to_ || to_.particle_stride == 1; }
+  View<T> view() const { return direct() ? to_ : View<T>{copy_, 1, kTile}; }
+  void finish(std::ptrdiff_t count) const {
+    if (direct()) return;
+    for (std::ptrdiff_t p = 0; p < count; ++p)
+      for (int k = 0; k < 9; ++k) to_(p, k) = copy_[k * kTile + p];
+  }
+
+ private:
+  View<T> to_;
+  T* copy_;
+};
+constexpr std::ptrdiff_t kPlanesOfTile = 9 * kTile;
+
 template <class T>
 class LearnedLawKernel final : public LawKernel<T> {
  public:
@@ -128,20 +157,37 @@ class LearnedLawKernel final : public LawKernel<T> {
 
   void evaluate(std::ptrdiff_t count, T, View<const T> F_trial, View<const T> C, View<T> F_proj,
                 View<T> tau) const override {
-    T* scratch = scratch_of_thread<T>(table_.scratch(law_));
-    for (std::ptrdiff_t p = 0; p < count; p += kTile)
-      table_.evaluate(law_, std::min(kTile, count - p), F_trial.from(p), C.from(p), F_proj.from(p),
-                      tau.from(p), scratch);
+    T* planes = scratch_of_thread<T>(4 * kPlanesOfTile + table_.scratch(law_));
+    T* scratch = planes + 4 * kPlanesOfTile;
+    for (std::ptrdiff_t p = 0; p < count; p += kTile) {
+      const std::ptrdiff_t n = std::min(kTile, count - p);
+      const PlaneOutput<T> F_out(F_proj.from(p), planes + 2 * kPlanesOfTile);
+      const PlaneOutput<T> tau_out(tau.from(p), planes + 3 * kPlanesOfTile);
+      table_.evaluate(law_, n, planes_of<T>(F_trial.from(p), n, planes),
+                      planes_of<T>(C.from(p), n, planes + kPlanesOfTile), F_out.view(),
+                      tau_out.view(), scratch);
+      F_out.finish(n);
+      tau_out.finish(n);
+    }
   }
 
   void adjoint(std::ptrdiff_t count, T, View<const T> F_trial, View<const T> C,
                View<const T> grad_F_proj, View<const T> grad_tau, View<T> grad_F_trial,
                View<T> grad_C, T* accumulator) const override {
-    T* scratch = scratch_of_thread<T>(table_.scratch(law_));
-    for (std::ptrdiff_t p = 0; p < count; p += kTile)
-      table_.adjoint(law_, std::min(kTile, count - p), F_trial.from(p), C.from(p),
-                     grad_F_proj.from(p), grad_tau.from(p), grad_F_trial.from(p), grad_C.from(p),
+    T* planes = scratch_of_thread<T>(6 * kPlanesOfTile + table_.scratch(law_));
+    T* scratch = planes + 6 * kPlanesOfTile;
+    for (std::ptrdiff_t p = 0; p < count; p += kTile) {
+      const std::ptrdiff_t n = std::min(kTile, count - p);
+      const auto of = [planes](int k) { return planes + k * kPlanesOfTile; };
+      const PlaneOutput<T> F_out(grad_F_trial.from(p), of(4)), C_out(grad_C.from(p), of(5));
+      if (!C_out.direct()) planes_of<T>(grad_C.from(p), n, of(5));  // it is added to
+      table_.adjoint(law_, n, planes_of<T>(F_trial.from(p), n, of(0)),
+                     planes_of<T>(C.from(p), n, of(1)), planes_of<T>(grad_F_proj.from(p), n, of(2)),
+                     planes_of<T>(grad_tau.from(p), n, of(3)), F_out.view(), C_out.view(),
                      accumulator, scratch);
+      F_out.finish(n);
+      C_out.finish(n);
+    }
   }
 
  private:

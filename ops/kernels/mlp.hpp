@@ -1,6 +1,6 @@
 #pragma once
 
-#include "ops/kernels/lanes.hpp"
+#include "ops/kernels/activation.hpp"
 #include "ops/kernels/learned_law_table.hpp"
 
 // A multilayer perceptron over a tile of kTile particles, one particle a lane. Activations are
@@ -9,27 +9,6 @@
 
 namespace uniphy::kernels {
 inline namespace UNIPHY_ISA {
-
-/// The value of an activation and, where asked, its derivative.
-template <Activation A, class V>
-UNIPHY_INLINE V activate(const V& x, V* slope) {
-  using T = ScalarOf<V>;
-  const V one(T(1)), half(T(0.5));
-  if constexpr (A == Activation::gelu) {
-    const V phi = fma(half, lane_erf(x * V(T(0.70710678118654752440))), half);
-    if (slope) *slope = fma(x * V(T(0.39894228040143267794)), lane_exp(x * x * V(T(-0.5))), phi);
-    return x * phi;
-  } else if constexpr (A == Activation::silu) {
-    // Bounded below so that exp stays finite; silu is 0 to rounding there.
-    const V sigma = one / (one + lane_exp(-lane_max(x, V(T(-80)))));
-    if (slope) *slope = sigma * fma(x, one - sigma, one);
-    return x * sigma;
-  } else {
-    const V root = lane_sqrt(fma(x, x, V(T(4))));
-    if (slope) *slope = fma(half, x / root, half);
-    return fma(half, x + root, V(T(-1)));
-  }
-}
 
 /// out = bias + W in for one tile: `packed` is [padded(rows) / 4, cols, 4]. A null bias is zero.
 template <class T>

@@ -70,6 +70,7 @@ class RolloutEngine {
   void begin_step(int chunk, std::ptrdiff_t s);
   void transfer_layers(std::ptrdiff_t s, int part, int parts);
   void end_step(int chunk, std::ptrdiff_t s);
+  void prefetch_backward_step(int chunk, std::ptrdiff_t s);
   void begin_backward_step(int chunk, std::ptrdiff_t s);
   void transfer_layers_backward(std::ptrdiff_t s, int part, int parts);
   void end_backward_step(int chunk, std::ptrdiff_t s);

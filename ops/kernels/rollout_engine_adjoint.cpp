@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "ops/kernels/prefetch.hpp"
 #include "ops/kernels/rollout_engine.hpp"
 #include "ops/kernels/team_barrier.hpp"
 
@@ -38,6 +39,19 @@ void RolloutEngine<T>::transfer_layers_backward(std::ptrdiff_t s, int part, int 
   }
 }
 
+/// What end_backward_step(chunk, s) and begin_backward_step(chunk, s − 1) will touch.
+template <class T>
+void RolloutEngine<T>::prefetch_backward_step(int chunk, std::ptrdiff_t s) {
+  if (chunk >= chunks()) return;
+  constexpr std::size_t kVectorBytes = 3 * kChunk * sizeof(T);
+  prefetch(&transfer_[chunk], sizeof(TransferChunk<T>));
+  prefetch(grads_.data() + chunk * std::ptrdiff_t(kStateChunkSize), kStateChunkSize * sizeof(T));
+  prefetch(state(s + 1, chunk) + kPlaneV * kChunk, kVectorBytes);
+  prefetch(state(s, chunk), kStateChunkSize * sizeof(T));
+  prefetch(stress(s, chunk), kMatrixChunkSize * sizeof(T));
+  if (s > 0) prefetch(state(s - 1, chunk) + kPlaneX * kChunk, kVectorBytes);
+}
+
 template <class T>
 void RolloutEngine<T>::end_backward_step(int chunk, std::ptrdiff_t s) {
   alignas(64) T moments[kGatherAdjointPlanes * kChunk];
@@ -48,6 +62,7 @@ void RolloutEngine<T>::end_backward_step(int chunk, std::ptrdiff_t s) {
   T* grad = grads_.data() + chunk * std::ptrdiff_t(kStateChunkSize);
   const GridView<const T> grid = grid_view<const T>(grid_nodes_.data(), constants_.n);
   const GridView<const T> grad_grid = grid_view<const T>(grad_nodes_.data(), constants_.n);
+  prefetch_backward_step(chunk + 1, s);
 
   table_.gather_slopes(transfer, grid, moments);
   table_.g2p_adjoint_finish(transfer, moments, state(s + 1, chunk) + kPlaneV * kChunk, constants_,

@@ -89,7 +89,7 @@ void Measurer::run(const Effort& effort) {
             for (auto _ : state) work.body();
             work.spent += std::chrono::duration<double>(Clock::now() - start).count();
           })
-          ->MinTime(effort.seconds)
+          ->MinTime(std::max(effort.seconds, 1e-9))
           ->UseRealTime();
     }
     if (running.empty()) break;
