@@ -17,16 +17,16 @@ Chart roofline(const BenchReport& report) {
   chart.width = 1100;
   chart.height = 700;
   const double ridge = m.fma_core / m.copy_core;
-  chart.series.push_back({fmt::format("copy bandwidth, {:.0f} GB/s", m.copy_core),
-                          {0.5, ridge},
-                          {0.5 * m.copy_core, m.fma_core},
-                          {},
-                          false});
-  chart.series.push_back({fmt::format("multiply-adds, {:.0f} Gflop/s", m.fma_core),
-                          {ridge, std::max(4 * ridge, 4000.0)},
-                          {m.fma_core, m.fma_core},
-                          {},
-                          false});
+  const auto roof = [&chart](std::string label, std::vector<double> x, std::vector<double> y) {
+    chart.series.emplace_back();
+    chart.series.back().label = std::move(label);
+    chart.series.back().x = std::move(x);
+    chart.series.back().y = std::move(y);
+  };
+  roof(fmt::format("copy bandwidth, {:.0f} GB/s", m.copy_core), {0.5, ridge},
+       {0.5 * m.copy_core, m.fma_core});
+  roof(fmt::format("multiply-adds, {:.0f} Gflop/s", m.fma_core),
+       {ridge, std::max(4 * ridge, 4000.0)}, {m.fma_core, m.fma_core});
   // One series for each kind of work, its passes and sizes as points.
   for (const BenchRow& row : report.rows) {
     if (!std::isfinite(row.flops) || !std::isfinite(row.bytes) || row.work == "svd3 f64") continue;
@@ -34,8 +34,10 @@ Chart roofline(const BenchReport& report) {
     auto at = std::find_if(chart.series.begin(), chart.series.end(),
                            [&](const Series& s) { return s.label == label; });
     if (at == chart.series.end()) {
-      chart.series.push_back({label, {}, {}, {}, true});
+      chart.series.emplace_back();
       at = chart.series.end() - 1;
+      at->label = label;
+      at->points = true;
     }
     at->x.push_back(row.flops / row.bytes);
     at->y.push_back(row.flops / row.one / 1e9);
