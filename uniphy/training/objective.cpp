@@ -40,6 +40,8 @@ Tensor strain_measure(const Tensor& x, const Tensor& gamma, const Tensor& delta)
 
 /// The least weight of a cap that is missed where the law does not cut.
 constexpr double kLeastShare = 0.05;
+/// Pulls the share of a trajectory that returns the whole way to 1.
+constexpr double kReturnWhole = 1;
 
 /// Invariants of w [N, m, 3], as in ops/kernels/isotropic_law.hpp.
 struct Invariants {
@@ -68,16 +70,16 @@ Objective::Objective(const LawColumns& columns, kernels::LawForm form, double fl
 }
 
 LawErrors Objective::errors(const Networks& networks, const Tensor& z, const Tensor& rows,
-                            const Tensor& scale_rows, bool whole_way) const {
+                            const Tensor& scale_rows) const {
   const Tensor batch = columns_.index_select(0, rows.reshape({-1}))
                            .view({rows.size(0), rows.size(1), columns_.size(1)});
   const Tensor scale = scales_.index_select(0, scale_rows);
-  return form_ == kernels::LawForm::isotropic ? isotropic(networks, z, batch, scale, whole_way)
+  return form_ == kernels::LawForm::isotropic ? isotropic(networks, z, batch, scale)
                                               : seed(networks, z, batch, scale);
 }
 
 LawErrors Objective::isotropic(const Networks& networks, const Tensor& z, const Tensor& batch,
-                               const Tensor& scale, bool whole_way) const {
+                               const Tensor& scale) const {
   using Column = IsotropicColumns;
   const Tensor s = kernels::kStressScale * torch::exp(kernels::kStressRate * z.select(1, 0));
   const Tensor e = kernels::kStrainScale * torch::exp(kernels::kStrainRate * z.select(1, 1));
@@ -98,9 +100,7 @@ LawErrors Objective::isotropic(const Networks& networks, const Tensor& z, const 
   const Tensor cap_t = e1 * (c.select(2, 1) - c_rest.select(2, 1).clamp_max(0.0));
   const Tensor mean_square =
       torch::exp(2.0 * (deviator + trace.unsqueeze(2) / 3.0)).mean(2);  // b̄, where nothing clamps
-  const Tensor share = whole_way
-                           ? torch::ones_like(mean_square)
-                           : 1.0 / (1.0 + torch::exp(-c.select(2, 3).clamp(-40, 40)) / mean_square);
+  const Tensor share = 1.0 / (1.0 + torch::exp(-c.select(2, 3).clamp(-40, 40)) / mean_square);
   const Tensor norm = deviator.norm(2, 2);
   const Tensor norm_kind = column(batch, Column::norm_yields);
   const Tensor norm_decrease = column(batch, Column::norm_decrease);
@@ -110,9 +110,10 @@ LawErrors Objective::isotropic(const Networks& networks, const Tensor& z, const 
   // Where the law does not cut, any cap beyond the strain is right, the less so the smaller the
   // share; where it cuts to nothing, any cap at or below zero is.
   const Tensor missed = torch::relu(norm - cap_q) * share.detach().clamp_min(kLeastShare);
-  const Tensor of_norm =
-      torch::where(norm_kind > 1.5, norm - share * (norm - torch::relu(cap_q)),
-                   torch::where(norm_kind > 0.5, share * (norm - cap_q) - norm_decrease, missed));
+  const auto of_norm = [&](const Tensor& r) {
+    return torch::where(norm_kind > 1.5, norm - r * (norm - torch::relu(cap_q)),
+                        torch::where(norm_kind > 0.5, r * (norm - cap_q) - norm_decrease, missed));
+  };
   // Whatever the share, a cap is no higher than what a sample that yields comes down to. Without
   // this a share near 0 would hide a cap that is far too high.
   const Tensor above =
@@ -127,10 +128,12 @@ LawErrors Objective::isotropic(const Networks& networks, const Tensor& z, const 
   const Tensor strain_rms = scale.select(1, 1).unsqueeze(1);
   const Tensor decrease_rms = scale.select(1, 2).unsqueeze(1);
   const Tensor unit = torch::where(decrease_rms > 0, decrease_rms, strain_rms);
+  const Tensor others = square(above) + square(of_fluid) + square(of_trace) / 3.0;
+  const Tensor size2 = decrease2 + square(floor_ * unit) + 1e-20;
   LawErrors errors;
-  errors.projection =
-      (square(of_norm) + square(above) + square(of_fluid) + square(of_trace) / 3.0) /
-      (decrease2 + square(floor_ * unit) + 1e-20);
+  errors.projection = (square(of_norm(share)) + others) / size2;
+  errors.projection_whole = (square(of_norm(torch::ones_like(share))) + others) / size2;
+  errors.share = share;
 
   // The stress, in the frame of the projected F.
   const Tensor w = columns(batch, Column::projected_deviator, 3) * inv_e.unsqueeze(2);
@@ -198,6 +201,13 @@ LawErrors Objective::seed(const Networks& networks, const Tensor& z, const Tenso
 
 Tensor Objective::robust_mean(const Tensor& errors, double delta) {
   return torch::log1p(errors / delta).mean();
+}
+
+Tensor Objective::projection_loss(const LawErrors& errors, double delta, bool caps_first) {
+  const auto loss = [delta](const Tensor& e) { return torch::log1p(e / delta).mean(1); };
+  if (!errors.share.defined()) return loss(errors.projection);
+  const Tensor whole = loss(errors.projection_whole) + kReturnWhole * (1.0 - errors.share).mean(1);
+  return caps_first ? whole : torch::minimum(loss(errors.projection), whole);
 }
 
 }  // namespace uniphy

@@ -17,6 +17,10 @@ namespace uniphy {
 struct LawErrors {
   torch::Tensor stress;
   torch::Tensor projection;
+  // Isotropic form, else undefined: the projection's error if the whole of what exceeds the cap
+  // were taken off, and the share that is.
+  torch::Tensor projection_whole;
+  torch::Tensor share;
 };
 
 /// The differentiable errors of the learned law on samples grouped by trajectory; the loss of
@@ -27,18 +31,21 @@ class Objective {
   Objective(const LawColumns& columns, kernels::LawForm form, double floor);
 
   /// rows: [N, m] sample indices, row i of trajectory scale_rows[i]; z: [N, latent_size].
-  /// `whole_way`: the isotropic form is taken to return to its cap at once, whatever its share
-  /// says. As long as a cap is far off, a share near 0 is the easy way out, and a trap: caps come
-  /// first.
   LawErrors errors(const Networks& networks, const torch::Tensor& z, const torch::Tensor& rows,
-                   const torch::Tensor& scale_rows, bool whole_way = false) const;
+                   const torch::Tensor& scale_rows) const;
 
   /// mean log(1 + error/δ) of both kinds, a logarithm so that no trajectory drowns the others.
   static torch::Tensor robust_mean(const torch::Tensor& errors, double delta);
 
+  /// The projection's loss of every trajectory, [N]: mean log(1 + error/δ), of the law as it is or
+  /// of one that returns the whole way, whichever is less; the latter pulls the share to 1. As long
+  /// as a cap is far off, a share near 0 is the easy way out, and a trap; a trajectory that returns
+  /// the whole way never has to take it. `caps_first`: only the latter.
+  static torch::Tensor projection_loss(const LawErrors& errors, double delta, bool caps_first);
+
  private:
   LawErrors isotropic(const Networks& networks, const torch::Tensor& z, const torch::Tensor& batch,
-                      const torch::Tensor& scale, bool whole_way) const;
+                      const torch::Tensor& scale) const;
   LawErrors seed(const Networks& networks, const torch::Tensor& z, const torch::Tensor& batch,
                  const torch::Tensor& scale) const;
 

@@ -19,7 +19,7 @@ namespace {
 using torch::Tensor;
 
 constexpr std::int64_t kReportEvery = 100;
-constexpr double kCapsFirst = 0.6;  ///< share of the steps with Objective::errors' whole_way
+constexpr double kCapsFirst = 0.3;  ///< share of the steps, see Objective::projection_loss
 
 double cosine(double rate, std::int64_t step, std::int64_t steps) {
   // A short warm-up: AdamW's first steps are as large as the rate whatever the gradient.
@@ -96,12 +96,13 @@ TrainingResult train(const Dataset& data, const TrainingOptions& o,
     set_rate(optimizer, 0, cosine(o.learning_rate, step, o.steps));
     set_rate(optimizer, 1, cosine(o.learning_rate * o.latent_rate, step, o.steps));
     optimizer.zero_grad();
-    const LawErrors errors =
-        objective.errors(result.networks, result.z, sampler.rows(step, o.batch_per_trajectory), all,
-                         double(step) < kCapsFirst * double(o.steps));
+    const LawErrors errors = objective.errors(result.networks, result.z,
+                                              sampler.rows(step, o.batch_per_trajectory), all);
+    const bool caps_first = double(step) < kCapsFirst * double(o.steps);
     const Tensor prior = result.z.pow(2).sum(1).mean() / (o.latent_sigma * o.latent_sigma);
     const Tensor loss = Objective::robust_mean(errors.stress, o.delta) +
-                        Objective::robust_mean(errors.projection, o.delta) + prior * 1e-2;
+                        Objective::projection_loss(errors, o.delta, caps_first).mean() +
+                        prior * 1e-2;
     loss.backward();
     torch::nn::utils::clip_grad_norm_(parameters, o.clip);
     optimizer.step();
@@ -135,7 +136,8 @@ Tensor fit_latents(const Dataset& data, const Networks& trained, const Tensor& t
   const std::int64_t starts = std::min(o.starts, codes);
   const auto loss_of = [&](const Tensor& z, const Tensor& rows, const Tensor& of) {
     const LawErrors e = objective.errors(networks, z, rows, of);
-    return torch::log1p(e.stress / o.delta).mean(1) + torch::log1p(e.projection / o.delta).mean(1);
+    return torch::log1p(e.stress / o.delta).mean(1) +
+           Objective::projection_loss(e, o.delta, /*caps_first=*/false);
   };
   // Which training codes answer best, a code at a time against all trajectories.
   Tensor scores = torch::empty({codes, n});
