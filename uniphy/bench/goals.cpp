@@ -90,7 +90,7 @@ std::vector<Goal> goals(const BenchReport& report, const BenchOptions& options) 
   for (const BenchRow& row : report.rows) {
     if (row.particles >= kManyParticles) gain.add(row.second_core());
   }
-  if (std::isfinite(gain.low)) {
+  if (report.machine.threads > 1 && std::isfinite(gain.low)) {
     g.push_back(
         {"second_core_min", "second core, least gain from 1e4 particles on", gain.low, 1.7, false});
   }
