@@ -6,14 +6,19 @@ namespace uniphy::kernels {
 
 namespace {
 
-/// rows×cols matrix (element (r, c) by a function) as [padded(rows) / 4, cols, 4].
-template <class T, class Element>
-std::vector<T> pack(int rows, int cols, const Element& element) {
+/// rows×cols matrix, element (r, c) at from[r * row_stride + c * column_stride], as
+/// [padded(rows) / 4, cols, 4].
+template <class T>
+std::vector<T> pack(int rows, int cols, const double* from, std::ptrdiff_t row_stride,
+                    std::ptrdiff_t column_stride) {
   std::vector<T> packed(std::size_t(padded(rows)) * cols, T(0));
-  for (int r = 0; r < rows; ++r)
-    for (int c = 0; c < cols; ++c)
-      packed[(std::size_t(r / kOutputBlock) * cols + c) * kOutputBlock + r % kOutputBlock] =
-          T(element(r, c));
+  T* to = packed.data();
+  for (int first = 0; first < rows; first += kOutputBlock) {
+    const int count = std::min(kOutputBlock, rows - first);
+    const double* block = from + first * row_stride;
+    for (int c = 0; c < cols; ++c, to += kOutputBlock)
+      for (int r = 0; r < count; ++r) to[r] = T(block[r * row_stride + c * column_stride]);
+  }
   return packed;
 }
 
@@ -39,8 +44,8 @@ PackedMlpStorage<T>::PackedMlpStorage(const MlpWeights& weights, Activation acti
     if (k == 0)
       for (int r = 0; r < out; ++r)
         for (int c = 0; c < folded; ++c) latent_weight_.push_back(element(r, in + c));
-    numbers_.push_back(pack<T>(out, in, element));
-    numbers_.push_back(pack<T>(in, out, [&](int r, int c) { return element(c, r); }));
+    numbers_.push_back(pack<T>(out, in, layer.weight.data(), layer.in, 1));
+    numbers_.push_back(pack<T>(in, out, layer.weight.data(), 1, layer.in));
     numbers_.push_back(std::move(bias));
     const std::size_t at = numbers_.size() - 3;
     layers_.push_back(

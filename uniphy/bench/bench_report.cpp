@@ -39,6 +39,11 @@ std::vector<const BenchRow*> BenchReport::all(const std::string& work,
   return found;
 }
 
+double speedup_of_both(const BenchRow& forward, const BenchRow& backward) {
+  const auto ours = [](const BenchRow& r) { return r.plain_setting.threads == 1 ? r.one : r.all; };
+  return (forward.plain + backward.plain) / (ours(forward) + ours(backward));
+}
+
 BenchRow make_row(const Measurer& measurer, const std::string& name, const std::string& work,
                   const std::string& pass, std::int64_t particles, double per_call) {
   BenchRow row;
