@@ -118,11 +118,11 @@ TEST_P(LearnedLawOp, FollowsItsReference) {
     // The seed form sees U and V, which rounding turns by eps/gap.
     const bool turns = form() == LawForm::seed;
     EXPECT_LE(relative(out.F_proj, expected.F_proj), turns ? 1e-10 : 1e-12);
-    EXPECT_LE(relative(out.tau, expected.tau), turns ? 1e-9 : 1e-11);
+    EXPECT_LE(relative(out.tau, expected.tau), turns ? 3e-9 : 1e-11);
     const Gradients g = gradients(out, F, C, z), e = gradients(expected, F, C, z);
     EXPECT_LE(relative(g.F, e.F), turns ? 1e-6 : 1e-9);
     EXPECT_LE(relative(g.C, e.C), turns ? 1e-9 : 1e-10);
-    EXPECT_LE(relative(g.z, e.z), turns ? 1e-9 : 1e-10);
+    EXPECT_LE(relative(g.z, e.z), turns ? 3e-9 : 1e-10);
     EXPECT_GT(e.F.norm().item<double>(), 0);
     EXPECT_GT(e.z.norm().item<double>(), 0);
     largest = std::max({largest, relative(g.F, e.F), relative(g.C, e.C), relative(g.z, e.z)});
@@ -209,7 +209,7 @@ TEST_P(LearnedLawOp, FloatFollowsDouble) {
   const LawOutput narrow =
       learned_law(w, F.to(torch::kFloat32), C.to(torch::kFloat32), latent(torch::kFloat32));
   EXPECT_EQ(narrow.tau.scalar_type(), torch::kFloat32);
-  EXPECT_LE(relative(narrow.F_proj.to(torch::kFloat64), wide.F_proj), 1e-5);
+  EXPECT_LE(relative(narrow.F_proj.to(torch::kFloat64), wide.F_proj), 3e-5);
   EXPECT_LE(relative(narrow.tau.to(torch::kFloat64), wide.tau), 1e-4);
 }
 
