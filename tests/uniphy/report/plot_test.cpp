@@ -113,7 +113,7 @@ TEST(Plot, NothingToDrawIsAWarning) {
 TEST(Plot, MalformedInputIsAnError) {
   const testing::Scratch scratch;
   Chart chart;
-  chart.series.push_back({"s", {0, 1}, {1}, {}, false});
+  chart.series.push_back({"s", {0, 1}, {1}, {}, false, {}});
   EXPECT_EQ(
       testing::without_directory(
           testing::error_of([&] { plot_chart(scratch.file("c.png"), chart); }), scratch.path()),
