@@ -66,10 +66,12 @@ def spectral(self, F: Tensor) -> Tuple[Tensor, Tensor, Tensor]:
     U, S, Vh = torch.linalg_svd(F)
     # The sign of det F goes to the last singular value: sigma may be negative and U V^T is a
     # rotation. Which of U and V holds a reflection makes no difference to isotropic functions.
+    # As a factor, not by joining columns: the fuser of LibTorch 2 with LLVM (Debian 13) takes
+    # minutes to compile what follows a cat.
+    mirror = 1.0 - 2.0 * torch.eye(3, dtype=F.dtype, device=F.device)[2]
     negative = torch.linalg_det(U) * torch.linalg_det(Vh) < 0.0
-    flip = torch.where(negative, -torch.ones_like(S[:, 2]), torch.ones_like(S[:, 2]))
-    sigma = torch.cat([S[:, :2], (S[:, 2] * flip).unsqueeze(1)], 1)
-    return U, sigma, torch.cat([Vh[:, :2], Vh[:, 2:] * flip.unsqueeze(1).unsqueeze(2)], 1)
+    sign = torch.where(negative.unsqueeze(1), mirror, torch.ones_like(mirror))
+    return U, S * sign, Vh * sign.unsqueeze(2)
 
 def invariants(self, sigma: Tensor, e: Tensor) -> Tuple[Tensor, Tensor, Tensor, Tensor]:
     eps = torch.log(torch.clamp(sigma, min=MINIMUM_STRETCH))
