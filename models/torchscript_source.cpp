@@ -40,6 +40,10 @@ std::string network(const std::string& name, std::size_t depth, Activation activ
   return text + "    return x\n\n";
 }
 
+// Columns are joined by hstack, column_stack and dstack, never by cat or stack: the fuser of LibTorch
+// 2 with LLVM (Debian 13's) joins a cat with what comes before and after it, and then compiles for
+// minutes.
+
 /// Checks of the arguments, and the latent as rows [1 or P, Z].
 const char* const kCommon = R"(
 def matrices(self, name: str, m: Tensor, count: int) -> Tensor:
@@ -66,8 +70,6 @@ def spectral(self, F: Tensor) -> Tuple[Tensor, Tensor, Tensor]:
     U, S, Vh = torch.linalg_svd(F)
     # The sign of det F goes to the last singular value: sigma may be negative and U V^T is a
     # rotation. Which of U and V holds a reflection makes no difference to isotropic functions.
-    # As a factor, not by joining columns: the fuser of LibTorch 2 with LLVM (Debian 13) takes
-    # minutes to compile what follows a cat.
     mirror = 1.0 - 2.0 * torch.eye(3, dtype=F.dtype, device=F.device)[2]
     negative = torch.linalg_det(U) * torch.linalg_det(Vh) < 0.0
     sign = torch.where(negative.unsqueeze(1), mirror, torch.ones_like(mirror))
@@ -103,9 +105,9 @@ def project(self, F: Tensor, z: Tensor) -> Tensor:
     U, sigma, Vt = self.spectral(f)
     w, t, q, cubic = self.invariants(sigma, e)
     code = rows.expand(f.size(0), rows.size(1))
-    c = self.projection_network(torch.cat([torch.stack([t, q, cubic], 1), code], 1))
+    c = self.projection_network(torch.column_stack([t, q, cubic, code]))
     zero = torch.zeros([rows.size(0), 3], dtype=f.dtype, device=f.device)
-    rest = self.projection_network(torch.cat([zero, rows], 1))
+    rest = self.projection_network(torch.hstack([zero, rows]))
     slope = self.sinh_of(c[:, 2])
     c1 = c[:, 0] + slope * t
     c2 = c[:, 1] - torch.clamp(rest[:, 1], max=0.0)
@@ -136,9 +138,9 @@ def stress(self, F_proj: Tensor, C: Tensor, z: Tensor) -> Tensor:
     n = torch.sqrt((D_dev * D_dev).sum([1, 2]) + SMOOTHING * SMOOTHING) - SMOOTHING
     x = (w * (U * torch.matmul(D_dev, U)).sum(1)).sum(1) / (1.0 + n * q)
     code = rows.expand(f.size(0), rows.size(1))
-    a = self.stress_network(torch.cat([torch.stack([t, q, cubic, D_trace, n, x], 1), code], 1))
+    a = self.stress_network(torch.column_stack([t, q, cubic, D_trace, n, x, code]))
     zero = torch.zeros([rows.size(0), 6], dtype=f.dtype, device=f.device)
-    rest = self.stress_network(torch.cat([zero, rows], 1))
+    rest = self.stress_network(torch.hstack([zero, rows]))
     e = self.strain_scale(rows)
     b = self.sinh_of(a[:, 4])
     volume = self.measure(t * e, self.exponent_of(a[:, 6]), self.exponent_of(a[:, 7]))
@@ -208,7 +210,7 @@ def signed_svd(self, F: Tensor) -> Tuple[Tensor, Tensor, Tensor]:
     w2 = (w * w).sum(1, keepdim=True)
     x = u0[:, 0:1]
     zero = torch.zeros_like(x)
-    other = torch.where(torch.abs(x) < 0.6, torch.cat([zero, -u0[:, 2:3], u0[:, 1:2]], 1), torch.cat([-u0[:, 2:3], zero, x], 1))
+    other = torch.where(torch.abs(x) < 0.6, torch.hstack([zero, -u0[:, 2:3], u0[:, 1:2]]), torch.hstack([-u0[:, 2:3], zero, x]))
     w = torch.where((w2 > TINY) & (w2 > 0.25 * (a[1] * a[1]).sum(1, keepdim=True)), w, other)
     u1 = w / torch.sqrt((w * w).sum(1, keepdim=True))
     u1 = u1 - (u0 * u1).sum(1, keepdim=True) * u0
@@ -217,8 +219,8 @@ def signed_svd(self, F: Tensor) -> Tuple[Tensor, Tensor, Tensor]:
     u2 = torch.linalg_cross(u0, u1)
     s1 = (u1 * a[1]).sum(1, keepdim=True)
     s2 = (u2 * a[2]).sum(1, keepdim=True)
-    sigma = torch.masked_fill(torch.cat([s0, s1, s2], 1) * scale[:, 0], vanishing[:, 0], 0.0)
-    return torch.stack([u0, u1, u2], 2), sigma, torch.stack(v, 2)
+    sigma = torch.masked_fill(torch.hstack([s0, s1, s2]) * scale[:, 0], vanishing[:, 0], 0.0)
+    return torch.dstack([u0, u1, u2]), sigma, torch.dstack(v)
 
 def project(self, F: Tensor, z: Tensor) -> Tensor:
     f = self.matrices("F", F, -1)
@@ -226,7 +228,7 @@ def project(self, F: Tensor, z: Tensor) -> Tensor:
     U, sigma, V = self.signed_svd(f)
     code = rows.expand(f.size(0), rows.size(1))
     features = [f.flatten(1), U.flatten(1), sigma, V.transpose(1, 2).flatten(1), code]
-    return (f + self.projection_network(torch.cat(features, 1)).reshape(f.size())).to(F.dtype)
+    return (f + self.projection_network(torch.hstack(features)).reshape(f.size())).to(F.dtype)
 
 def stress(self, F_proj: Tensor, C: Tensor, z: Tensor) -> Tensor:
     f = self.matrices("F_proj", F_proj, -1)
@@ -238,7 +240,7 @@ def stress(self, F_proj: Tensor, C: Tensor, z: Tensor) -> Tensor:
     F_max = torch.clamp(f[:, 0, 0:1], min=1e-6)
     rate = torch.matmul(R.transpose(1, 2), torch.matmul(c, R)) * TIME_SCALE
     features = [sigma, torch.matmul(f.transpose(1, 2), f).flatten(1), J, torch.log(torch.clamp(J, min=1e-6)), F_max, torch.log(F_max), rate.flatten(1), rows.expand(f.size(0), rows.size(1))]
-    S = self.stress_network(torch.cat(features, 1)).reshape(f.size())
+    S = self.stress_network(torch.hstack(features)).reshape(f.size())
     tau = torch.matmul(R, torch.matmul(0.5 * (S + S.transpose(1, 2)), R.transpose(1, 2)))
     return (self.stress_scale(rows).unsqueeze(1).unsqueeze(2) * tau).to(F_proj.dtype)
 )";
