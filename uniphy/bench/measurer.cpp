@@ -1,6 +1,5 @@
 #include "uniphy/bench/measurer.hpp"
 
-#include <ATen/Parallel.h>
 #include <benchmark/benchmark.h>
 #include <dlfcn.h>
 #include <fmt/format.h>
@@ -46,8 +45,9 @@ std::string describe(const ThreadSetting& s) {
 }
 
 void apply(const ThreadSetting& setting) {
+  // LibTorch asks OpenMP, too. Its own at::set_num_threads would start a new pool of threads every
+  // time, which spin for some 20 ms and take a processor from what is measured.
   omp_set_num_threads(setting.threads);
-  at::set_num_threads(setting.threads);
   if (auto* set = openblas<void(int)>("openblas_set_num_threads")) set(setting.blas_threads);
 }
 
