@@ -7,6 +7,7 @@
 #include "ops/kernels/aligned_buffer.hpp"
 #include "ops/kernels/error.hpp"
 #include "ops/kernels/learned_law_table.hpp"
+#include "ops/plain_tensors.hpp"
 
 namespace uniphy::ops {
 namespace {
@@ -200,16 +201,11 @@ torch::Tensor activate(const torch::Tensor& x, kernels::Activation activation) {
   return 0.5 * (x + torch::sqrt(x * x + 4.0)) - 1.0;
 }
 
-thread_local bool plain_mlp = false;
-
 }  // namespace
-
-PlainMlp::PlainMlp() : before_(plain_mlp) { plain_mlp = true; }
-PlainMlp::~PlainMlp() { plain_mlp = before_; }
 
 torch::Tensor mlp(const torch::Tensor& x, const std::vector<LinearLayer>& layers,
                   kernels::Activation activation) {
-  if (plain_mlp) return mlp_reference(x, layers, activation);
+  if (PlainTensors::asked_for()) return mlp_reference(x, layers, activation);
   check(x, layers);
   variable_list tensors;
   std::vector<std::int64_t> widths{x.size(1)};

@@ -26,17 +26,4 @@ torch::Tensor mlp(const torch::Tensor& x, const std::vector<LinearLayer>& layers
 torch::Tensor mlp_reference(const torch::Tensor& x, const std::vector<LinearLayer>& layers,
                             kernels::Activation activation);
 
-/// While one of these lives, mlp() is mlp_reference() on the thread that made it: a computation
-/// built on mlp() can be compared with the same one in plain tensor operations.
-class PlainMlp {
- public:
-  PlainMlp();
-  ~PlainMlp();
-  PlainMlp(const PlainMlp&) = delete;
-  PlainMlp& operator=(const PlainMlp&) = delete;
-
- private:
-  bool before_;
-};
-
 }  // namespace uniphy::ops

@@ -7,6 +7,7 @@
 #include <torch/torch.h>
 
 #include "ops/kernels/error.hpp"
+#include "ops/plain_tensors.hpp"
 #include "tests/support/network_cases.hpp"
 
 namespace uniphy::ops {
@@ -48,7 +49,7 @@ TEST_P(MlpTest, PlainVersionStandsInWhileAskedFor) {
   const Tensor x = torch::randn({70, 11});
   const Tensor fused = mlp(x, l, GetParam()), expected = mlp_reference(x, l, GetParam());
   {
-    const PlainMlp plain;
+    const PlainTensors plain;
     EXPECT_TRUE(torch::equal(mlp(x, l, GetParam()), expected));
   }
   EXPECT_TRUE(torch::equal(mlp(x, l, GetParam()), fused));
