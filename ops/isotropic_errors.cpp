@@ -31,8 +31,7 @@ struct Arguments {
 
 void check_batch(const char* op, Arguments& a) {
   const auto type = real_type(op, "columns", a.columns);
-  a.columns =
-      checked(op, "columns", a.columns, type, {kAnySize, kernels::IsotropicColumns::count});
+  a.columns = checked(op, "columns", a.columns, type, {kAnySize, kernels::IsotropicColumns::count});
   a.rows = checked(op, "rows", a.rows, torch::kInt64, {kAnySize, kAnySize});
   if (a.samples() == 0) throw Error(std::string(op) + ": rows: expected one sample or more");
   a.z = checked(op, "z", a.z, type, {a.trajectories(), kAnySize});
@@ -48,7 +47,8 @@ void check_batch(const char* op, Arguments& a) {
 }
 
 /// One answer for each sample, or one for all.
-Tensor checked_answers(const char* name, const Tensor& t, const Arguments& a, std::int64_t outputs) {
+Tensor checked_answers(const char* name, const Tensor& t, const Arguments& a,
+                       std::int64_t outputs) {
   const std::int64_t m = t.defined() && t.dim() == 3 && t.size(1) == 1 ? 1 : a.samples();
   return checked("isotropic_errors", name, t, a.columns.scalar_type(),
                  {a.trajectories(), m, outputs});
@@ -128,12 +128,10 @@ class IsotropicErrorsFunction : public torch::autograd::Function<IsotropicErrors
                                const Tensor& caps_rest, const Tensor& moduli,
                                const Tensor& moduli_rest, const Tensor& columns, const Tensor& rows,
                                const Tensor& scales, double floor, double delta) {
-    const Arguments a{columns, rows,   scales,      z,     caps,
-                      caps_rest, moduli, moduli_rest, floor, delta};
+    const Arguments a{columns, rows, scales, z, caps, caps_rest, moduli, moduli_rest, floor, delta};
     const Tensor losses = torch::empty({a.trajectories(), kIsotropicLosses}, z.options());
     const Tensor errors = torch::empty({a.trajectories(), 2}, z.options());
-    for_real_type(z.scalar_type(),
-                  [&](auto zero) { evaluate<decltype(zero)>(a, losses, errors); });
+    for_real_type(z.scalar_type(), [&](auto zero) { evaluate<decltype(zero)>(a, losses, errors); });
     ctx->save_for_backward({z, caps, caps_rest, moduli, moduli_rest, columns, rows, scales});
     ctx->saved_data["floor"] = floor;
     ctx->saved_data["delta"] = delta;
@@ -146,8 +144,15 @@ class IsotropicErrorsFunction : public torch::autograd::Function<IsotropicErrors
     variable_list result(10);
     if (!grad[0].defined()) return result;
     const variable_list s = ctx->get_saved_variables();
-    const Arguments a{s[5], s[6], s[7], s[0], s[1],
-                      s[2], s[3], s[4], ctx->saved_data["floor"].toDouble(),
+    const Arguments a{s[5],
+                      s[6],
+                      s[7],
+                      s[0],
+                      s[1],
+                      s[2],
+                      s[3],
+                      s[4],
+                      ctx->saved_data["floor"].toDouble(),
                       ctx->saved_data["delta"].toDouble()};
     // z and the answers at rest: what is not written is 0.
     const auto zeros = [&](std::size_t k) {
@@ -206,10 +211,11 @@ class IsotropicFeaturesFunction : public torch::autograd::Function<IsotropicFeat
       T* to = result[0].template data_ptr<T>();
 #pragma omp parallel for schedule(static)
       for (std::int64_t i = 0; i < n; ++i)
-        to[i * latent + 1] = T(kernels::kStrainRate) *
-                             table.features_adjoint(samples_of<T>(a, i),
-                                                    of_projection ? of_projection + 3 * m * i : nullptr,
-                                                    of_stress ? of_stress + 6 * m * i : nullptr);
+        to[i * latent + 1] =
+            T(kernels::kStrainRate) *
+            table.features_adjoint(samples_of<T>(a, i),
+                                   of_projection ? of_projection + 3 * m * i : nullptr,
+                                   of_stress ? of_stress + 6 * m * i : nullptr);
     });
     return result;
   }

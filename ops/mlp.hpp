@@ -22,7 +22,13 @@ struct LinearLayer {
 torch::Tensor mlp(const torch::Tensor& x, const std::vector<LinearLayer>& layers,
                   kernels::Activation activation);
 
-/// The same in plain tensor operations.
+/// The same for samples that share codes: features [N, m, f] with z [N, Z] beside every sample of a
+/// code, the first layer's inputs being the features, then z → [N, m, out]. Differentiable by z
+/// too.
+torch::Tensor mlp(const torch::Tensor& features, const torch::Tensor& z,
+                  const std::vector<LinearLayer>& layers, kernels::Activation activation);
+
+/// The first of these in plain tensor operations.
 torch::Tensor mlp_reference(const torch::Tensor& x, const std::vector<LinearLayer>& layers,
                             kernels::Activation activation);
 

@@ -19,11 +19,11 @@ template <class V>
 struct ProjectionErrors {
   HenckyStrain<V> trial;
   Caps<V> cap;
-  V cap_q, cap_t;            ///< Q, T
-  MaskOf<V> cuts, to_zero;   ///< the law cuts ‖ε̂‖ to something, to 0
+  V cap_q, cap_t;           ///< Q, T
+  MaskOf<V> cuts, to_zero;  ///< the law cuts ‖ε̂‖ to something, to 0
   MaskOf<V> cuts_trace;
-  V missed_weight;           ///< max(r, 0.05)
-  V partial, whole;          ///< a(r), a(1)
+  V missed_weight;              ///< max(r, 0.05)
+  V partial, whole;             ///< a(r), a(1)
   V above, of_fluid, of_trace;  ///< the parts of o
   V inverse_size2;
   V error, error_whole;
@@ -99,8 +99,8 @@ template <int outputs, class V, class T>
 UNIPHY_INLINE void load_answers(const T* from, bool of_state, std::ptrdiff_t first,
                                 std::ptrdiff_t count, V (&o)[outputs]) {
   for (int k = 0; k < outputs; ++k)
-    o[k] = of_state ? load_lanes<V, T>({from, outputs, 1}, first, k, count - first, T(0))
-                    : V(from[k]);
+    o[k] =
+        of_state ? load_lanes<V, T>({from, outputs, 1}, first, k, count - first, T(0)) : V(from[k]);
 }
 
 /// The answers to one vector of samples; those that are constants are read once.

@@ -27,12 +27,10 @@ UNIPHY_INLINE CapGradients<V> projection_errors_adjoint(const ProjectionErrors<V
   const auto positive = p.cap_q > zero;
   const V cut_q = fma(g_others, p.above, -fma(g_partial, share, g_whole));
   const V zero_q = select<V>(positive, fma(g_partial, share, g_whole), zero);
-  const V missed_q =
-      select<V>(norm > p.cap_q, -(p.missed_weight * (g_partial + g_whole)), zero);
+  const V missed_q = select<V>(norm > p.cap_q, -(p.missed_weight * (g_partial + g_whole)), zero);
   const V g_q = select<V>(p.to_zero, zero_q, select<V>(p.cuts, cut_q, missed_q));
   const V excess = norm - select<V>(p.to_zero, lane_max(zero, p.cap_q), p.cap_q);
-  const V of_excess =
-      select<V>(p.to_zero, -excess, select<V>(p.cuts, excess, zero));  // da(r)/dr
+  const V of_excess = select<V>(p.to_zero, -excess, select<V>(p.cuts, excess, zero));  // da(r)/dr
   const V g_share = fma(g_partial, of_excess, per_share);
 
   // of_fluid is 0 unless c₁ moves it.
@@ -60,16 +58,14 @@ UNIPHY_INLINE CoefficientGradients<V> stress_errors_adjoint(const IsotropicAnswe
                                                             const V& inv_e, const V& per_error) {
   const V zero(T(0));
   const Coefficients<V>& c = answers.coefficients;
-  const Mat3<V> S =
-      r.difference * (per_error * r.inverse_size2 * V(T(2) * a.stress_scale));
+  const Mat3<V> S = r.difference * (per_error * r.inverse_size2 * V(T(2) * a.stress_scale));
   CoefficientGradients<V> g = coefficient_gradients(
       r.state, c, r.measures, S, dot(S, r.state.rate_frame), answers.moduli, inv_e);
   // w = ε̂/e enters `second`.
   V g_q = zero;
   const Vec3<V> gw = second_gradient(r.state, c.a2, S, g_q);
   const StrainInvariants<V>& v = r.state.invariants;
-  for (int i = 0; i < 3; ++i)
-    g.log_e = g.log_e - fma(g_q, v.w[i] * v.inverse_root, gw[i]) * v.w[i];
+  for (int i = 0; i < 3; ++i) g.log_e = g.log_e - fma(g_q, v.w[i] * v.inverse_root, gw[i]) * v.w[i];
   return g;
 }
 
@@ -120,14 +116,14 @@ inline void isotropic_errors_adjoint(const IsotropicAnswers<T>& a, const T* weig
     // d log(1 + x/δ)/dx = 1/(δ + x)
     const auto weight = [&](int k) { return share_of_mean * V(weights[k]); };
     const ProjectionErrors<V> p = projection_errors<V, T>(a, sample, answers.caps, inv_e);
-    const CapGradients<V> g = projection_errors_adjoint(
-        p, e, weight(kProjectionLoss) / (delta + p.error),
-        weight(kWholeLoss) / (delta + p.error_whole), weight(kShare));
+    const CapGradients<V> g =
+        projection_errors_adjoint(p, e, weight(kProjectionLoss) / (delta + p.error),
+                                  weight(kWholeLoss) / (delta + p.error_whole), weight(kShare));
     of_caps.add(l, a.samples.count, g.output);
     rest_cap = rest_cap - g.c2;
     const StressErrors<V> s = stress_errors<V, T>(a, sample, answers.coefficients, inv_e);
-    const CoefficientGradients<V> h = stress_errors_adjoint<V, T>(
-        a, s, answers, inv_e, weight(kStressLoss) / (delta + s.error));
+    const CoefficientGradients<V> h =
+        stress_errors_adjoint<V, T>(a, s, answers, inv_e, weight(kStressLoss) / (delta + s.error));
     of_moduli.add(l, a.samples.count, h.output);
     rest_pressure = rest_pressure - h.a0;
     log_s = log_s + h.log_s;

@@ -39,15 +39,15 @@ struct IsotropicSamples {
 template <class T>
 struct IsotropicAnswers {
   IsotropicSamples<T> samples;
-  const T* caps;                 ///< [count or 1, 4]
-  const T* moduli;               ///< [count or 1, 8]
-  bool state_caps, state_moduli; ///< whether there is one for each sample
-  T rest_cap;                    ///< min(c₂(rest), 0)
-  T rest_pressure;               ///< a₀(rest)
-  T stress_scale;                ///< s, Pa
-  T stress_floor2;               ///< (f R_τ)²
-  T strain_floor2;               ///< (f R_Δ)²
-  T delta;                       ///< δ of log(1 + error/δ)
+  const T* caps;                  ///< [count or 1, 4]
+  const T* moduli;                ///< [count or 1, 8]
+  bool state_caps, state_moduli;  ///< whether there is one for each sample
+  T rest_cap;                     ///< min(c₂(rest), 0)
+  T rest_pressure;                ///< a₀(rest)
+  T stress_scale;                 ///< s, Pa
+  T stress_floor2;                ///< (f R_τ)²
+  T strain_floor2;                ///< (f R_Δ)²
+  T delta;                        ///< δ of log(1 + error/δ)
 };
 
 /// Means over the samples of a trajectory; the last two are for reports and have no gradient.
@@ -81,8 +81,7 @@ struct IsotropicErrorsTable {
   /// What networks that answer to the state see: projection [count, 3], stress [count, 6].
   void (*features)(const IsotropicSamples<T>&, T* projection, T* stress);
   /// dL/d(log e), given those of the features, either of which may be null.
-  T (*features_adjoint)(const IsotropicSamples<T>&, const T* grad_projection,
-                        const T* grad_stress);
+  T (*features_adjoint)(const IsotropicSamples<T>&, const T* grad_projection, const T* grad_stress);
 };
 
 /// Throws Error where the instruction set is not available.

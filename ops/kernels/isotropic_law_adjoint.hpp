@@ -66,8 +66,7 @@ inline void isotropic_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, Vi
     const Mat3<V> S = tmul(U, mul(gt, U));
     V o[8];
     load_outputs(a + l, o);
-    const CoefficientGradients<V> of =
-        coefficient_gradients(s, c, m, S, dot(gt, s.rate), o, inv_e);
+    const CoefficientGradients<V> of = coefficient_gradients(s, c, m, S, dot(gt, s.rate), o, inv_e);
     for (int k = 0; k < 8; ++k) store_plane(tile.grad_stress + k * kTile, l, of.output[k]);
     sum_rest = sum_rest + of.a0;
     sum_log_e = sum_log_e + of.log_e;
@@ -108,8 +107,8 @@ inline void isotropic_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, Vi
     Vec3<V> gd;
     V ge = -(f[0] * s.volumetric);  // dL/d(log e) but for the measures', counted above
     for (int i = 0; i < 3; ++i) {
-      const V gw = of_second[i] + of.aligned * s.rate_frame(i, i) +
-                   g_q * v.w[i] * v.inverse_root + f[2] * v.d_cubic[i];
+      const V gw = of_second[i] + of.aligned * s.rate_frame(i, i) + g_q * v.w[i] * v.inverse_root +
+                   f[2] * v.d_cubic[i];
       ge = ge - gw * v.w[i];
       const V of_strain = S(i, i) * a1 * m.strain[i].slope;  // dL/dε_i, ε_i = ε̂_i + t/3
       gd[i] = fma(gw, inv_e, of_strain);

@@ -19,6 +19,11 @@ class SampleLanes {
 
   SampleLanes(const IsotropicSamples<T>& samples, std::ptrdiff_t first) {
     constexpr int w = width_of<V>;
+    // Rows lie anywhere in a table larger than the caches: ask for those of the vectors to come.
+    const std::ptrdiff_t ahead = first + kVectorsAhead * w;
+    for (std::ptrdiff_t l = ahead; l < std::min(ahead + w, samples.count); ++l) fetch(samples, l);
+    for (std::ptrdiff_t l = 0; first == 0 && l < std::min(ahead, samples.count); ++l)
+      fetch(samples, l);
     for (int l = 0; l < w; ++l) {
       const std::ptrdiff_t at = std::min(first + l, samples.count - 1);
       const T* row = samples.columns + samples.rows[at] * IsotropicColumns::count;
@@ -41,6 +46,15 @@ class SampleLanes {
   }
 
  private:
+  static constexpr std::ptrdiff_t kVectorsAhead = 64 / width_of<V>;
+
+  static UNIPHY_INLINE void fetch(const IsotropicSamples<T>& samples, std::ptrdiff_t sample) {
+    const T* row = samples.columns + samples.rows[sample] * IsotropicColumns::count;
+    for (int k = 0; k < IsotropicColumns::count; k += 64 / int(sizeof(T)))
+      __builtin_prefetch(row + k);
+    __builtin_prefetch(row + IsotropicColumns::count - 1);
+  }
+
   alignas(64) T plane_[IsotropicColumns::count * width_of<V>];
 };
 

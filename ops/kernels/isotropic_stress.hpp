@@ -86,8 +86,8 @@ struct Coefficients {
 /// o: the stress network's outputs; `rest`: what a₀ has taken off.
 template <class V>
 UNIPHY_INLINE Coefficients<V> coefficients(const V (&o)[8], const V& rest) {
-  return {sinh_of(o[0]),     sinh_of(o[2]),     sinh_of(o[4]),    o[1] - rest, o[3],
-          exponent_of(o[5]), exponent_of(o[6]), exponent_of(o[7])};
+  return {sinh_of(o[0]), sinh_of(o[2]),     sinh_of(o[4]),     o[1] - rest,
+          o[3],          exponent_of(o[5]), exponent_of(o[6]), exponent_of(o[7])};
 }
 /// `a`: the planes of the stress network's outputs from a lane on.
 template <class V, class T>

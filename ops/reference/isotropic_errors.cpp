@@ -94,9 +94,9 @@ ProjectionErrors projection_errors(const Tensor& batch, const Tensor& scales, co
       torch::where((norm_kind > 0.5) & (norm_kind < 1.5), torch::relu(cap_q - norm + norm_decrease),
                    torch::zeros_like(norm));
   // A fluid's cap is to lie below kFluidCap, with some room.
-  const Tensor of_fluid = torch::where((norm_kind > 1.5) & ~trace_cut,
-                                       0.1 * norm * torch::relu(c1 - 2 * kernels::kFluidCap),
-                                       torch::zeros_like(norm));
+  const Tensor of_fluid =
+      torch::where((norm_kind > 1.5) & ~trace_cut,
+                   0.1 * norm * torch::relu(c1 - 2 * kernels::kFluidCap), torch::zeros_like(norm));
   const Tensor of_trace =
       torch::where(trace_cut, cap_t - projected_trace, torch::relu(trace - cap_t));
   const Tensor decrease2 = square(norm_decrease) + square(trace_decrease) / 3.0;
@@ -161,7 +161,9 @@ IsotropicErrors isotropic_errors(const IsotropicBatch& table, const Tensor& scal
   const ProjectionErrors p = projection_errors(batch, scales, e, answers, measure.floor);
   const Tensor stress =
       stress_errors(batch, scales, stress_scale(z).unsqueeze(1), e, answers, measure.floor);
-  const auto loss = [&](const Tensor& error) { return torch::log1p(error / measure.delta).mean(1); };
+  const auto loss = [&](const Tensor& error) {
+    return torch::log1p(error / measure.delta).mean(1);
+  };
   // In the order of kernels::IsotropicMean.
   return {torch::stack({loss(stress), loss(p.error), loss(p.whole), p.share.mean(1)}, 1),
           torch::stack({stress.mean(1), p.error.mean(1)}, 1).detach()};

@@ -173,22 +173,39 @@ TEST(IsotropicErrors, RefusesWhatDoesNotFit) {
   const auto expect = [&](const auto& change, const std::string& part) {
     EXPECT_NE(message(change).find(part), std::string::npos) << message(change);
   };
-  expect([](Inputs& in) { in.batch.columns = torch::zeros({50, 23}); },
-         "columns: expected [any, 24] Float on cpu, found [50, 23] Float");
+  expect(
+      [](Inputs& in) {
+        in.batch.columns = torch::zeros({50, 23});
+      },
+      "columns: expected [any, 24] Float on cpu, found [50, 23] Float");
   expect([](Inputs& in) { in.batch.rows = in.batch.rows + 100; },
          "rows: expected 0 ... 49, found 1");
-  expect([](Inputs& in) { in.batch.rows = in.batch.rows.to(torch::kInt32); }, "expected [any, any] Long");
+  expect([](Inputs& in) { in.batch.rows = in.batch.rows.to(torch::kInt32); },
+         "expected [any, any] Long");
   expect([](Inputs& in) { in.batch.rows = in.batch.rows.narrow(1, 0, 0); },
          "rows: expected one sample or more");
   expect([](Inputs& in) { in.scales = torch::zeros({4, 2}); }, "scales: expected [4, 3]");
-  expect([](Inputs& in) { in.leaves[0] = torch::zeros({4, 1}); },
-         "z: expected 2 numbers or more a trajectory, found 1");
+  expect(
+      [](Inputs& in) {
+        in.leaves[0] = torch::zeros({4, 1});
+      },
+      "z: expected 2 numbers or more a trajectory, found 1");
   expect([](Inputs& in) { in.leaves[1] = torch::zeros({4, 6, 4}); }, "caps: expected [4, 7, 4]");
-  expect([](Inputs& in) { in.leaves[2] = torch::zeros({4, 7, 4}); }, "caps_rest: expected [4, 1, 4]");
-  expect([](Inputs& in) { in.leaves[3] = torch::zeros({4, 7, 8}, torch::kFloat64); },
-         "moduli: expected [4, 7, 8] Float");
-  expect([](Inputs& in) { in.leaves[4] = torch::zeros({4, 1, 4}); },
-         "moduli_rest: expected [4, 1, 8]");
+  expect(
+      [](Inputs& in) {
+        in.leaves[2] = torch::zeros({4, 7, 4});
+      },
+      "caps_rest: expected [4, 1, 4]");
+  expect(
+      [](Inputs& in) {
+        in.leaves[3] = torch::zeros({4, 7, 8}, torch::kFloat64);
+      },
+      "moduli: expected [4, 7, 8] Float");
+  expect(
+      [](Inputs& in) {
+        in.leaves[4] = torch::zeros({4, 1, 4});
+      },
+      "moduli_rest: expected [4, 1, 8]");
 }
 
 }  // namespace

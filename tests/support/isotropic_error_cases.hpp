@@ -14,10 +14,10 @@ namespace uniphy::testing {
 struct IsotropicErrorCase {
   std::int64_t trajectories, samples, table = 50, latent = 3;
   bool state_caps, state_moduli;
-  std::vector<double> columns;      ///< [table, IsotropicColumns::count]
-  std::vector<std::int64_t> rows;   ///< [trajectories, samples]
-  std::vector<double> scales;       ///< [trajectories, 3]
-  std::vector<double> z;            ///< [trajectories, latent]
+  std::vector<double> columns;     ///< [table, IsotropicColumns::count]
+  std::vector<std::int64_t> rows;  ///< [trajectories, samples]
+  std::vector<double> scales;      ///< [trajectories, 3]
+  std::vector<double> z;           ///< [trajectories, latent]
   std::vector<double> caps, caps_rest, moduli, moduli_rest;
   double floor = 0.1, delta = 1e-3;
 };

@@ -11,9 +11,7 @@ using torch::Tensor;
 /// The network on [N, m, features] with z [N, Z] beside every sample → [N, m, out].
 Tensor network(const std::vector<ops::LinearLayer>& layers, const Networks& networks,
                const Tensor& features, const Tensor& z) {
-  const std::int64_t n = features.size(0), m = features.size(1);
-  const Tensor in = torch::cat({features, z.unsqueeze(1).expand({n, m, z.size(1)})}, 2);
-  return ops::mlp(in.reshape({n * m, -1}), layers, networks.options.activation).view({n, m, -1});
+  return ops::mlp(features, z, layers, networks.options.activation);
 }
 
 /// Pulls the share of a trajectory that returns the whole way to 1.
@@ -52,16 +50,15 @@ LawErrors Objective::isotropic(const Networks& networks, const Tensor& z, const 
   if (options.state_caps || options.state_moduli) features = ops::isotropic_features(batch, z);
   ops::IsotropicAnswers answers;
   answers.caps_rest = network(networks.projection, networks, torch::zeros({n, 1, 3}), z);
-  answers.caps = options.state_caps
-                     ? network(networks.projection, networks, features.projection, z)
-                     : answers.caps_rest;
+  answers.caps = options.state_caps ? network(networks.projection, networks, features.projection, z)
+                                    : answers.caps_rest;
   answers.moduli_rest = network(networks.stress, networks, torch::zeros({n, 1, 6}), z);
   answers.moduli = options.state_moduli ? network(networks.stress, networks, features.stress, z)
                                         : answers.moduli_rest;
   const ops::IsotropicErrors e = ops::isotropic_errors(batch, scale, z, answers, measure_);
   const auto loss = [&e](kernels::IsotropicMean k) { return e.losses.select(1, k); };
   return {loss(kernels::kStressLoss), loss(kernels::kProjectionLoss), loss(kernels::kWholeLoss),
-          loss(kernels::kShare), e.errors.select(1, 0), e.errors.select(1, 1)};
+          loss(kernels::kShare),      e.errors.select(1, 0),          e.errors.select(1, 1)};
 }
 
 LawErrors Objective::seed(const Networks& networks, const Tensor& z, const Tensor& rows,
@@ -71,7 +68,8 @@ LawErrors Objective::seed(const Networks& networks, const Tensor& z, const Tenso
                            .view({rows.size(0), rows.size(1), columns_.size(1)});
   const auto columns = [&batch](int first, int count) { return batch.narrow(2, first, count); };
   const Tensor s = kernels::kStressScale * torch::exp(kernels::kStressRate * z.select(1, 0));
-  const Tensor delta = network(networks.projection, networks, columns(Column::projection_in, 30), z);
+  const Tensor delta =
+      network(networks.projection, networks, columns(Column::projection_in, 30), z);
   const Tensor true_delta = columns(Column::delta, 9);
   const Tensor strain_rms = scale.select(1, 1).unsqueeze(1);
   const Tensor decrease_rms = scale.select(1, 2).unsqueeze(1);
@@ -88,8 +86,8 @@ LawErrors Objective::seed(const Networks& networks, const Tensor& z, const Tenso
   const auto loss = [this](const Tensor& error) {
     return torch::log1p(error / measure_.delta).mean(1);
   };
-  return {loss(stress), loss(projection), {}, {}, stress.detach().mean(1),
-          projection.detach().mean(1)};
+  return {loss(stress), loss(projection),        {},
+          {},           stress.detach().mean(1), projection.detach().mean(1)};
 }
 
 Tensor Objective::loss(const LawErrors& e, bool caps_first) {

@@ -47,7 +47,6 @@ std::string note_of(const TrainingPoint& p) {
   return {note, note + length};
 }
 
-
 }  // namespace
 
 TrainingResult train(const Dataset& data, const TrainingOptions& o,

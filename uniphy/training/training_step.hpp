@@ -15,8 +15,8 @@ struct TrainingStep {
   torch::Tensor loss;  ///< before the step
   LawErrors errors;
 };
-/// One step of Algorithm 1 on the samples `rows` [N, m] of all trajectories: the loss, its gradient,
-/// and the optimizer's step. caps_first: see Objective::loss.
+/// One step of Algorithm 1 on the samples `rows` [N, m] of all trajectories: the loss, its
+/// gradient, and the optimizer's step. caps_first: see Objective::loss.
 TrainingStep training_step(const Objective& objective, const Networks& networks,
                            const torch::Tensor& z, const torch::Tensor& rows, bool caps_first,
                            const TrainingOptions& options, torch::optim::AdamW& optimizer);

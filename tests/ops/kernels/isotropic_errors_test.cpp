@@ -105,8 +105,8 @@ TEST_P(IsotropicErrorsOnIsa, GradientsAgreeWithCentralDifferences) {
       return sum;
     };
     // The share weighs a missed cap as a constant, which differences do not know.
-    const auto differences = testing::central_differences(
-        loss, t.inputs, std::vector<double>(t.inputs.size(), 1e-5));
+    const auto differences =
+        testing::central_differences(loss, t.inputs, std::vector<double>(t.inputs.size(), 1e-5));
     auto got = gradient<double>(GetParam(), c), want = differences;
     for (std::int64_t k = 0; k < (c.state_caps ? c.samples : 1); ++k)
       got[std::size_t(4 + 4 * k + 3)] = want[std::size_t(4 + 4 * k + 3)] = 0;
@@ -127,11 +127,11 @@ TEST_P(IsotropicErrorsOnIsa, TheShareHasItsGradientWhereTheLawCuts) {
       for (int k = 0; k < kIsotropicLosses; ++k) sum += kWeights[k] * m[k];
       return sum;
     };
-    EXPECT_LE(testing::relative_error(
-                  gradient<double>(GetParam(), c),
-                  testing::central_differences(loss, t.inputs,
-                                               std::vector<double>(t.inputs.size(), 1e-5))),
-              1e-6)
+    EXPECT_LE(
+        testing::relative_error(gradient<double>(GetParam(), c),
+                                testing::central_differences(
+                                    loss, t.inputs, std::vector<double>(t.inputs.size(), 1e-5))),
+        1e-6)
         << c.samples << " samples, " << c.state_caps << c.state_moduli;
   }
 }
@@ -157,9 +157,9 @@ TEST_P(IsotropicErrorsOnIsa, FeaturesAndTheirGradient) {
       return sum;
     };
     const std::vector<double> log_e{-2.7};
-    EXPECT_LE(testing::relative_error({table.features_adjoint(at(log_e), of_projection.data(),
-                                                              of_stress.data())},
-                                      testing::central_differences(loss, log_e, {1e-4})),
+    EXPECT_LE(testing::relative_error(
+                  {table.features_adjoint(at(log_e), of_projection.data(), of_stress.data())},
+                  testing::central_differences(loss, log_e, {1e-4})),
               1e-8);
     table.features(at(log_e), projection.data(), stress.data());
     baseline.features(at(log_e), expected.data(), unused.data());
