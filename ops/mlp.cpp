@@ -1,17 +1,18 @@
 #include "ops/mlp.hpp"
 
 #include <algorithm>
-#include <memory>
 #include <sstream>
 
 #include "ops/kernels/aligned_buffer.hpp"
 #include "ops/kernels/error.hpp"
 #include "ops/kernels/learned_law_table.hpp"
+#include "ops/mlp_problem.hpp"
+#include "ops/plain_tensors.hpp"
+#include "ops/tensor_check.hpp"
 
 namespace uniphy::ops {
 namespace {
 
-using kernels::kTile;
 using torch::autograd::AutogradContext;
 using torch::autograd::variable_list;
 
@@ -25,168 +26,209 @@ std::string shape_of(const torch::Tensor& t) {
   return text.str();
 }
 
-void check(const torch::Tensor& x, const std::vector<LinearLayer>& layers) {
+void check_layers(std::int64_t in, torch::ScalarType type, const std::vector<LinearLayer>& layers) {
   if (layers.empty()) throw Error("mlp: expected at least one layer");
-  if (x.dim() != 2 || !torch::isFloatingType(x.scalar_type()))
-    throw Error("mlp: x: expected a floating-point tensor [samples, features], found " +
-                shape_of(x));
-  std::int64_t in = x.size(1);
   for (std::size_t k = 0; k < layers.size(); ++k) {
     const torch::Tensor &w = layers[k].weight, &b = layers[k].bias;
     const bool fits = w.dim() == 2 && w.size(1) == in && b.dim() == 1 && b.size(0) == w.size(0) &&
-                      w.scalar_type() == x.scalar_type() && b.scalar_type() == x.scalar_type();
+                      w.scalar_type() == type && b.scalar_type() == type;
     if (!fits)
       throw Error("mlp: layer " + std::to_string(k) + ": expected a weight [out, " +
                   std::to_string(in) + "] and a bias [out] of type " +
-                  std::string(torch::toString(x.scalar_type())) + ", found " + shape_of(w) +
-                  " and " + shape_of(b));
+                  std::string(torch::toString(type)) + ", found " + shape_of(w) + " and " +
+                  shape_of(b));
     in = w.size(0);
   }
 }
 
-/// The weights and biases of all layers one after the other in one tensor (autograd's Function
-/// takes tensors, not lists of them), and the widths that cut it up.
-template <class T>
-std::unique_ptr<kernels::PackedMlpStorage<T>> pack(const torch::Tensor& flat,
-                                                   const std::vector<std::int64_t>& widths,
-                                                   kernels::Activation activation) {
-  kernels::MlpWeights weights;
-  const T* at = flat.data_ptr<T>();
-  for (std::size_t k = 0; k + 1 < widths.size(); ++k) {
-    const std::int64_t in = widths[k], out = widths[k + 1];
-    kernels::MlpWeights::Layer layer{int(in), int(out), {at, at + in * out}, {}};
-    at += in * out;
-    layer.bias.assign(at, at + out);
-    at += out;
-    weights.layers.push_back(std::move(layer));
-  }
-  return std::make_unique<kernels::PackedMlpStorage<T>>(weights, activation, std::vector<double>{});
+void check(const torch::Tensor& x, const std::vector<LinearLayer>& layers) {
+  if (x.dim() != 2 || !torch::isFloatingType(x.scalar_type()))
+    throw Error("mlp: x: expected a floating-point tensor [samples, features], found " +
+                shape_of(x));
+  check_layers(x.size(1), x.scalar_type(), layers);
 }
 
-/// Rows [first, first + kTile) of a row-major [samples, columns] as planes [columns, kTile];
-/// missing rows are zero.
-template <class T>
-void to_planes(const T* rows, std::int64_t count, std::int64_t columns, T* planes) {
-  for (std::int64_t c = 0; c < columns; ++c)
-    for (std::int64_t l = 0; l < kTile; ++l)
-      planes[c * kTile + l] = l < count ? rows[l * columns + c] : T(0);
-}
-template <class T>
-void from_planes(const T* planes, std::int64_t count, std::int64_t columns, T* rows) {
-  for (std::int64_t l = 0; l < count; ++l)
-    for (std::int64_t c = 0; c < columns; ++c) rows[l * columns + c] = planes[c * kTile + l];
+void check(const torch::Tensor& features, const torch::Tensor& z,
+           const std::vector<LinearLayer>& layers) {
+  if (features.dim() != 3 || !torch::isFloatingType(features.scalar_type()))
+    throw Error(
+        "mlp: features: expected a floating-point tensor [codes, samples, features], found " +
+        shape_of(features));
+  if (z.dim() != 2 || z.size(0) != features.size(0) || z.scalar_type() != features.scalar_type())
+    throw Error("mlp: z: expected [" + std::to_string(features.size(0)) + ", any] of type " +
+                std::string(torch::toString(features.scalar_type())) + ", found " + shape_of(z));
+  check_layers(features.size(2) + z.size(1), features.scalar_type(), layers);
 }
 
 template <class T>
-torch::Tensor forward(const torch::Tensor& x, const kernels::PackedMlp<T>& net) {
+MlpProblem<T> problem_of(const torch::Tensor& features, const torch::Tensor& z,
+                         const torch::Tensor& flat, const std::vector<std::int64_t>& widths,
+                         kernels::Activation activation) {
+  return {features.size(0), features.size(1), z.size(1), flat.data_ptr<T>(), widths, activation};
+}
+
+template <class T>
+torch::Tensor forward(const MlpProblem<T>& problem, const torch::Tensor& features,
+                      const torch::Tensor& z) {
   const auto& table = kernels::learned_law_table<T>();
-  const std::int64_t samples = x.size(0), tiles = (samples + kTile - 1) / kTile;
-  torch::Tensor y = torch::empty({samples, net.out()}, x.options());
-  const T* from = x.data_ptr<T>();
+  const kernels::PackedMlp<T>& net = problem.net();
+  torch::Tensor y = torch::empty({problem.codes, problem.per_code, net.out()}, features.options());
+  const T *from = features.data_ptr<T>(), *codes = z.data_ptr<T>();
   T* to = y.data_ptr<T>();
   const std::int64_t plane = std::int64_t(net.max_width) * kTile;
 #pragma omp parallel
   {
+    FoldedMlp<T> folded(problem);
     kernels::AlignedBuffer<T> scratch(2 * plane + net.tape_scratch());
     T *in = scratch.data(), *out = in + plane, *tape = out + plane;
 #pragma omp for schedule(static)
-    for (std::int64_t t = 0; t < tiles; ++t) {
-      const std::int64_t first = t * kTile, count = std::min<std::int64_t>(kTile, samples - first);
+    for (std::int64_t t = 0; t < problem.tiles(); ++t) {
+      const std::int64_t first = problem.first(t), count = problem.count(t);
       to_planes(from + first * net.in(), count, net.in(), in);
-      table.mlp_forward(net, in, out, tape);
+      table.mlp_forward(folded.of_code(codes + problem.code(t) * problem.latent), in, out, tape);
       from_planes(out, count, net.out(), to + first * net.out());
     }
   }
   return y;
 }
 
-/// Gradients of x and of the flat weights, each where it is wanted.
+/// Gradients of the features, z and the flat weights, each where it is wanted.
 template <class T>
-variable_list backward(const torch::Tensor& x, const torch::Tensor& flat, const torch::Tensor& grad,
-                       const kernels::PackedMlp<T>& net, bool want_x, bool want_weights) {
+variable_list backward(const MlpProblem<T>& problem, const torch::Tensor& features,
+                       const torch::Tensor& z, const torch::Tensor& flat, const torch::Tensor& grad,
+                       bool want_features, bool want_z, bool want_weights) {
   const auto& table = kernels::learned_law_table<T>();
-  const std::int64_t samples = x.size(0), tiles = (samples + kTile - 1) / kTile;
-  const std::int64_t plane = std::int64_t(net.max_width) * kTile, lanes = table.lanes;
-  torch::Tensor grad_x = want_x ? torch::empty_like(x) : torch::Tensor();
-  const std::int64_t numbers_per_sum = flat.numel() * lanes;
-  kernels::AlignedBuffer<T> sums(want_weights ? kSums * numbers_per_sum : 0);
-  if (want_weights) std::fill_n(sums.data(), kSums * numbers_per_sum, T(0));
-  const T *from = x.data_ptr<T>(), *grad_from = grad.data_ptr<T>();
-  T* grad_to = want_x ? grad_x.data_ptr<T>() : nullptr;
+  const kernels::PackedMlp<T>& net = problem.net();
+  const std::int64_t tiles = problem.tiles(), width = problem.first_width();
+  const std::int64_t latent = problem.latent, n_in = net.in();
+  const std::int64_t plane = std::int64_t(net.max_width) * kTile;
+  const std::int64_t sums = want_weights ? std::min(kSums, tiles) : kSums;
+  // Without the part of the first weight that takes z.
+  const std::int64_t per_sum = flat.numel() - width * latent;
+  torch::Tensor grad_features, grad_z, grad_flat;
+  if (want_features) grad_features = torch::empty_like(features);
+  std::vector<T> partial(want_weights ? std::size_t(sums * per_sum) : 0, T(0));
+  const bool want_bias = latent > 0 && (want_z || want_weights);
+  std::vector<T> first_bias(want_bias ? std::size_t(tiles * width) : 0, T(0));
+  const T *from = features.data_ptr<T>(), *codes = z.data_ptr<T>(), *grad_from = grad.data_ptr<T>();
+  T* grad_to = want_features ? grad_features.data_ptr<T>() : nullptr;
 #pragma omp parallel
   {
+    FoldedMlp<T> folded(problem);
     kernels::AlignedBuffer<T> scratch(4 * plane + net.tape_scratch());
     T *in = scratch.data(), *out = in + plane, *grad_out = out + plane, *grad_in = grad_out + plane,
       *tape = grad_in + plane;
     std::vector<kernels::WeightGradient<T>> weights(net.depth);
 #pragma omp for schedule(static)
-    for (std::int64_t sum = 0; sum < kSums; ++sum) {
-      T* at = sums.data() + (want_weights ? sum * numbers_per_sum : 0);
+    for (std::int64_t sum = 0; sum < sums; ++sum) {
+      T* at = partial.data() + (want_weights ? sum * per_sum : 0);
       for (int k = 0; want_weights && k < net.depth; ++k) {
         weights[k].weight = at;
-        at += std::int64_t(net.layer[k].in) * net.layer[k].out * lanes;
+        at += std::int64_t(net.layer[k].in) * net.layer[k].out;
         weights[k].bias = at;
-        at += net.layer[k].out * lanes;
+        at += net.layer[k].out;
       }
-      for (std::int64_t t = sum * tiles / kSums; t < (sum + 1) * tiles / kSums; ++t) {
-        const std::int64_t first = t * kTile,
-                           count = std::min<std::int64_t>(kTile, samples - first);
-        to_planes(from + first * net.in(), count, net.in(), in);
+      for (std::int64_t t = sum * tiles / sums; t < (sum + 1) * tiles / sums; ++t) {
+        const std::int64_t first = problem.first(t), count = problem.count(t);
+        const auto& of_code = folded.of_code(codes + problem.code(t) * latent);
+        to_planes(from + first * n_in, count, n_in, in);
         to_planes(grad_from + first * net.out(), count, net.out(), grad_out);
-        table.mlp_forward(net, in, out, tape);
-        table.mlp_backward(net, in, tape, grad_out, want_x ? grad_in : nullptr, nullptr,
+        table.mlp_forward(of_code, in, out, tape);
+        table.mlp_backward(of_code, in, tape, grad_out, want_features ? grad_in : nullptr,
+                           want_bias ? first_bias.data() + t * width : nullptr,
                            want_weights ? weights.data() : nullptr);
-        if (want_x) from_planes(grad_in, count, net.in(), grad_to + first * net.in());
+        if (want_features) from_planes(grad_in, count, n_in, grad_to + first * n_in);
       }
     }
   }
-  if (!want_weights) return {grad_x, torch::Tensor()};
-  torch::Tensor grad_flat = torch::empty_like(flat);
-  T* to = grad_flat.data_ptr<T>();
-  for (std::int64_t i = 0; i < flat.numel(); ++i) {
-    T total = 0;
-    for (std::int64_t sum = 0; sum < kSums; ++sum) {
-      const T* part = sums.data() + sum * numbers_per_sum + i * lanes;
-      for (std::int64_t l = 0; l < lanes; ++l) total += part[l];
-    }
-    to[i] = total;
+  // The gradient of the first bias, of every code in its first tile.
+  for (std::int64_t t = 0; want_bias && t < tiles; ++t) {
+    const std::int64_t to = problem.code(t) * problem.tiles_per_code;
+    for (std::int64_t o = 0; t != to && o < width; ++o)
+      first_bias[to * width + o] += first_bias[t * width + o];
   }
-  return {grad_x, grad_flat};
+  const auto bias_of = [&](std::int64_t code) {
+    return first_bias.data() + code * problem.tiles_per_code * width;
+  };
+  if (want_z) {
+    grad_z = torch::zeros_like(z);
+    T* to = grad_z.data_ptr<T>();
+    for (std::int64_t i = 0; want_bias && i < problem.codes; ++i)
+      for (std::int64_t o = 0; o < width; ++o)
+        for (std::int64_t k = 0; k < latent; ++k)
+          to[i * latent + k] += bias_of(i)[o] * problem.latent_weight(o)[k];
+  }
+  if (want_weights) {
+    grad_flat = torch::zeros_like(flat);
+    T* to = grad_flat.data_ptr<T>();
+    for (std::int64_t i = 0; want_bias && i < problem.codes; ++i)
+      for (std::int64_t o = 0; o < width; ++o)
+        for (std::int64_t k = 0; k < latent; ++k)
+          to[o * problem.in() + n_in + k] += bias_of(i)[o] * codes[i * latent + k];
+    for (std::int64_t sum = 0; sum < sums; ++sum) {
+      const T* part = partial.data() + sum * per_sum;
+      for (std::int64_t o = 0; o < width; ++o)
+        for (std::int64_t k = 0; k < n_in; ++k) to[o * problem.in() + k] += part[o * n_in + k];
+      for (std::int64_t i = width * n_in; i < per_sum; ++i) to[i + width * latent] += part[i];
+    }
+  }
+  return {grad_features, grad_z, grad_flat};
 }
 
 struct MlpFunction : torch::autograd::Function<MlpFunction> {
-  static torch::Tensor forward(AutogradContext* ctx, const torch::Tensor& x,
-                               const torch::Tensor& flat, std::vector<std::int64_t> widths,
-                               std::int64_t activation) {
-    const torch::Tensor input = x.contiguous();
-    ctx->save_for_backward({input, flat});
+  static torch::Tensor forward(AutogradContext* ctx, const torch::Tensor& features,
+                               const torch::Tensor& z, const torch::Tensor& flat,
+                               std::vector<std::int64_t> widths, std::int64_t activation) {
+    ctx->save_for_backward({features, z, flat});
     ctx->saved_data["widths"] = widths;
     ctx->saved_data["activation"] = activation;
-    const auto kind = static_cast<kernels::Activation>(activation);
-    return x.scalar_type() == torch::kFloat64
-               ? ops::forward<double>(input, pack<double>(flat, widths, kind)->mlp())
-               : ops::forward<float>(input, pack<float>(flat, widths, kind)->mlp());
+    torch::Tensor y;
+    for_real_type(features.scalar_type(), [&](auto zero) {
+      const auto problem = problem_of<decltype(zero)>(features, z, flat, widths,
+                                                      static_cast<kernels::Activation>(activation));
+      y = ops::forward(problem, features, z);
+    });
+    return y;
   }
 
   static variable_list backward(AutogradContext* ctx, const variable_list& grads) {
-    variable_list result(4);
+    variable_list result(5);
     if (!grads[0].defined()) return result;
     const variable_list saved = ctx->get_saved_variables();
-    const torch::Tensor &x = saved[0], &flat = saved[1], grad = grads[0].contiguous();
+    const torch::Tensor &features = saved[0], &z = saved[1], &flat = saved[2],
+                        grad = grads[0].contiguous();
     const std::vector<std::int64_t> widths = ctx->saved_data["widths"].toIntVector();
-    const auto kind = static_cast<kernels::Activation>(ctx->saved_data["activation"].toInt());
-    const bool want_x = ctx->needs_input_grad(0), want_weights = ctx->needs_input_grad(1);
-    const variable_list g =
-        x.scalar_type() == torch::kFloat64
-            ? ops::backward<double>(x, flat, grad, pack<double>(flat, widths, kind)->mlp(), want_x,
-                                    want_weights)
-            : ops::backward<float>(x, flat, grad, pack<float>(flat, widths, kind)->mlp(), want_x,
-                                   want_weights);
-    result[0] = g[0];
-    result[1] = g[1];
+    const auto activation = static_cast<kernels::Activation>(ctx->saved_data["activation"].toInt());
+    for_real_type(features.scalar_type(), [&](auto zero) {
+      const auto problem = problem_of<decltype(zero)>(features, z, flat, widths, activation);
+      const variable_list g =
+          ops::backward(problem, features, z, flat, grad, ctx->needs_input_grad(0),
+                        ctx->needs_input_grad(1), ctx->needs_input_grad(2));
+      std::copy(g.begin(), g.end(), result.begin());
+    });
     return result;
   }
 };
+
+torch::Tensor apply(const torch::Tensor& features, const torch::Tensor& z,
+                    const std::vector<LinearLayer>& layers, kernels::Activation activation) {
+  variable_list tensors;
+  std::vector<std::int64_t> widths{features.size(2) + z.size(1)};
+  for (const LinearLayer& layer : layers) {
+    tensors.push_back(layer.weight.reshape({-1}));
+    tensors.push_back(layer.bias);
+    widths.push_back(layer.weight.size(0));
+  }
+  return MlpFunction::apply(features.contiguous(), z.contiguous(), torch::cat(tensors), widths,
+                            static_cast<std::int64_t>(activation));
+}
+
+/// z beside every sample: [codes, samples, features + latent].
+torch::Tensor beside(const torch::Tensor& features, const torch::Tensor& z) {
+  const torch::Tensor every =
+      z.unsqueeze(1).expand({features.size(0), features.size(1), z.size(1)});
+  return torch::cat({features, every}, 2);
+}
 
 torch::Tensor activate(const torch::Tensor& x, kernels::Activation activation) {
   switch (activation) {
@@ -200,25 +242,24 @@ torch::Tensor activate(const torch::Tensor& x, kernels::Activation activation) {
   return 0.5 * (x + torch::sqrt(x * x + 4.0)) - 1.0;
 }
 
-thread_local bool plain_mlp = false;
-
 }  // namespace
-
-PlainMlp::PlainMlp() : before_(plain_mlp) { plain_mlp = true; }
-PlainMlp::~PlainMlp() { plain_mlp = before_; }
 
 torch::Tensor mlp(const torch::Tensor& x, const std::vector<LinearLayer>& layers,
                   kernels::Activation activation) {
-  if (plain_mlp) return mlp_reference(x, layers, activation);
+  if (PlainTensors::asked_for()) return mlp_reference(x, layers, activation);
   check(x, layers);
-  variable_list tensors;
-  std::vector<std::int64_t> widths{x.size(1)};
-  for (const LinearLayer& layer : layers) {
-    tensors.push_back(layer.weight.reshape({-1}));
-    tensors.push_back(layer.bias);
-    widths.push_back(layer.weight.size(0));
-  }
-  return MlpFunction::apply(x, torch::cat(tensors), widths, static_cast<std::int64_t>(activation));
+  return apply(x.unsqueeze(0), torch::empty({1, 0}, x.options()), layers, activation).squeeze(0);
+}
+
+torch::Tensor mlp(const torch::Tensor& features, const torch::Tensor& z,
+                  const std::vector<LinearLayer>& layers, kernels::Activation activation) {
+  check(features, z, layers);
+  // A tile belongs to one code: with few samples each, most of it would be empty.
+  if (!PlainTensors::asked_for() && features.size(1) >= kTile / 2)
+    return apply(features, z, layers, activation);
+  const torch::Tensor x = beside(features, z);
+  return mlp(x.flatten(0, 1), layers, activation)
+      .view({features.size(0), features.size(1), layers.back().weight.size(0)});
 }
 
 torch::Tensor mlp_reference(const torch::Tensor& x, const std::vector<LinearLayer>& layers,

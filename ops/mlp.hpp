@@ -22,21 +22,14 @@ struct LinearLayer {
 torch::Tensor mlp(const torch::Tensor& x, const std::vector<LinearLayer>& layers,
                   kernels::Activation activation);
 
-/// The same in plain tensor operations.
+/// The same for samples that share codes: features [N, m, f] with z [N, Z] beside every sample of a
+/// code, the first layer's inputs being the features, then z → [N, m, out]. Differentiable by z
+/// too.
+torch::Tensor mlp(const torch::Tensor& features, const torch::Tensor& z,
+                  const std::vector<LinearLayer>& layers, kernels::Activation activation);
+
+/// The first of these in plain tensor operations.
 torch::Tensor mlp_reference(const torch::Tensor& x, const std::vector<LinearLayer>& layers,
                             kernels::Activation activation);
-
-/// While one of these lives, mlp() is mlp_reference() on the thread that made it: a computation
-/// built on mlp() can be compared with the same one in plain tensor operations.
-class PlainMlp {
- public:
-  PlainMlp();
-  ~PlainMlp();
-  PlainMlp(const PlainMlp&) = delete;
-  PlainMlp& operator=(const PlainMlp&) = delete;
-
- private:
-  bool before_;
-};
 
 }  // namespace uniphy::ops

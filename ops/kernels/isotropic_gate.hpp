@@ -69,22 +69,47 @@ struct Caps {
   V share;        ///< r
   V mean_square;  ///< b̄
 };
+/// What the projection network answers, as far as it does not depend on the state.
+template <class V>
+struct CapOutputs {
+  V c0, c2;
+  SinhOf<V> slope;
+  V odds;  ///< exp(−κ)
+};
+template <class V>
+UNIPHY_INLINE CapOutputs<V> cap_outputs(const V& c0, const V& c2, const V& m, const V& kappa) {
+  using T = ScalarOf<V>;
+  // Half the range of exp, so that neither it nor its square overflows in float.
+  const V rate = lane_max(lane_min(kappa, V(T(40))), V(T(-40)));
+  return {c0, c2, sinh_of(m), lane_exp(-rate)};
+}
+/// t: tr ε/e; `rest`: what c₂ has taken off.
+template <class V>
+UNIPHY_INLINE Caps<V> caps(const CapOutputs<V>& c, const V& rest, const V& t,
+                           const Vec3<V>& stretch) {
+  using T = ScalarOf<V>;
+  const V one = V(T(1));
+  Caps<V> r;
+  r.slope = c.slope.value;
+  r.per_m = c.slope.slope * t;
+  r.c1 = fma(r.slope, t, c.c0);
+  r.c2 = c.c2 - rest;
+  r.mean_square = dot(stretch, stretch) * V(T(1.0 / 3));
+  r.share = one / (one + c.odds / r.mean_square);
+  return r;
+}
+/// dL/dκ, given dL/dr; also dL/d(log b̄).
+template <class V>
+UNIPHY_INLINE V rate_gradient(const Caps<V>& cap, const V& g_share) {
+  return g_share * cap.share * (V(ScalarOf<V>(1)) - cap.share);
+}
 /// `c`, `features`: the planes of a tile from lane l on, outputs and inputs of the projection.
 template <class V, class T>
 UNIPHY_INLINE Caps<V> caps(const LearnedLaw<T>& law, const T* c, const T* features,
                            const HenckyStrain<V>& h) {
-  const V one = V(T(1)), t = V::load_aligned(features);
-  const SinhOf<V> slope = sinh_of(V::load_aligned(c + 2 * kTile));
-  Caps<V> r;
-  r.slope = slope.value;
-  r.per_m = slope.slope * t;
-  r.c1 = fma(r.slope, t, V::load_aligned(c));
-  r.c2 = V::load_aligned(c + kTile) - V(law.rest_cap);
-  r.mean_square = dot(h.stretch, h.stretch) * V(T(1.0 / 3));
-  // Half the range of exp, so that neither it nor its square overflows in float.
-  const V rate = lane_max(lane_min(V::load_aligned(c + 3 * kTile), V(T(40))), V(T(-40)));
-  r.share = one / (one + lane_exp(-rate) / r.mean_square);
-  return r;
+  const auto output = [c](int k) { return V::load_aligned(c + k * kTile); };
+  return caps(cap_outputs<V>(output(0), output(1), output(2), output(3)), V(law.rest_cap),
+              V::load_aligned(features), h.stretch);
 }
 
 /// The gate's answer for one vector of particles.

@@ -64,31 +64,13 @@ inline void isotropic_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, Vi
     const Measures<V> m = measures(s, c);
     const Mat3<V> gt = sym(load_mat3<V, T>(grad_tau, l, count - l, false)) * scale;
     const Mat3<V> S = tmul(U, mul(gt, U));
-    V g_a0 = zero, g_a1 = zero, g_a2 = zero, g_n = zero;
-    for (int i = 0; i < 3; ++i) {
-      g_a0 = g_a0 + S(i, i);
-      g_a1 = fma(S(i, i), m.strain[i].value * inv_e, g_a1);
-      g_a2 = fma(S(i, i), s.second[i], g_a2);
-      g_n = fma(S(i, i), m.strain[i].per_gamma + m.strain[i].per_delta, g_n);
-    }
-    const V g_k = g_a0 * m.volume.value * inv_e, g_volume = g_a0 * c.k.value * inv_e;
-    const V g_b = dot(gt, s.rate) + g_a0 * s.rate_trace * third;
-    const auto exponent = [&](int k, const V& g) {
-      store_plane(tile.grad_stress + k * kTile, l,
-                  exponent_gradient(V::load_aligned(a + k * kTile + l), g));
-    };
-    store_plane(tile.grad_stress, l, g_k * c.k.slope);
-    store_plane(tile.grad_stress + kTile, l, g_a0);
-    store_plane(tile.grad_stress + 2 * kTile, l, g_a1 * c.a1.slope);
-    store_plane(tile.grad_stress + 3 * kTile, l, g_a2);
-    store_plane(tile.grad_stress + 4 * kTile, l, g_b * c.b.slope);
-    exponent(5, g_n * c.a1.value * inv_e * V(T(0.5)));
-    exponent(6, g_volume * m.volume.per_gamma);
-    exponent(7, g_volume * m.volume.per_delta);
-    sum_rest = sum_rest + g_a0;
-    const V of_measures = g_k * c.k.value + g_a1 * c.a1.value;  // both go as 1/e
-    sum_log_e = sum_log_e - of_measures;
-    sum_log_s = sum_log_s + of_measures + g_a0 * c.a0 + g_a2 * c.a2 + g_b * c.b.value;
+    V o[8];
+    load_outputs(a + l, o);
+    const CoefficientGradients<V> of = coefficient_gradients(s, c, m, S, dot(gt, s.rate), o, inv_e);
+    for (int k = 0; k < 8; ++k) store_plane(tile.grad_stress + k * kTile, l, of.output[k]);
+    sum_rest = sum_rest + of.a0;
+    sum_log_e = sum_log_e + of.log_e;
+    sum_log_s = sum_log_s + of.log_s;
   }
   T* const stress_bias = accumulator ? accumulator + law.projection.layer[0].out : nullptr;
   T* const feature = tile.grad_features;
@@ -113,25 +95,20 @@ inline void isotropic_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, Vi
     const Mat3<V> S = tmul(U, mul(gt, U));
     const StrainInvariants<V>& v = s.invariants;
 
-    // x = aligned / (1 + n q)
-    const V inv_x = one / fma(s.rate_norm, v.q, one);
-    const V g_aligned = f[5] * inv_x;
-    const V g_rate_norm = f[4] - f[5] * s.x * v.q * inv_x;
-    V g_q = f[1] - f[5] * s.x * s.rate_norm * inv_x;
+    const FeatureGradients<V> of = feature_gradients(s, f);
+    V g_q = of.q;
 
     // The diagonal: d_i = k m(t)/e + a₀ + b tr(D)/3 + a₁ m(ε_i)/e + a₂ second_i, and the
     // invariants of w. gd is dL/dε̂, g_trace_p dL/dt.
-    const V sum_S = S(0, 0) + S(1, 1) + S(2, 2), mean_S = sum_S * third;
+    const V sum_S = S(0, 0) + S(1, 1) + S(2, 2);
     const V a1 = c.a1.value * inv_e;
     V g_trace_p = fma(sum_S * c.k.value, m.volume.slope, f[0]) * inv_e;
-    for (int i = 0; i < 3; ++i) g_q = g_q - S(i, i) * c.a2 * s.second[i] * s.spread;
-    const V slope2 = two * c.a2 * s.spread;
+    const Vec3<V> of_second = second_gradient(s, c.a2, S, g_q);
     Vec3<V> gd;
     V ge = -(f[0] * s.volumetric);  // dL/d(log e) but for the measures', counted above
     for (int i = 0; i < 3; ++i) {
-      V gw = slope2 * v.w[i] * (S(i, i) - mean_S);
-      gw =
-          gw + g_aligned * s.rate_frame(i, i) + g_q * v.w[i] * v.inverse_root + f[2] * v.d_cubic[i];
+      const V gw = of_second[i] + of.aligned * s.rate_frame(i, i) + g_q * v.w[i] * v.inverse_root +
+                   f[2] * v.d_cubic[i];
       ge = ge - gw * v.w[i];
       const V of_strain = S(i, i) * a1 * m.strain[i].slope;  // dL/dε_i, ε_i = ε̂_i + t/3
       gd[i] = fma(gw, inv_e, of_strain);
@@ -142,7 +119,7 @@ inline void isotropic_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, Vi
     for (int k = 0; k < 3; ++k) {
       const int i = kPair[k][0], j = kPair[k][1];
       const V of_w =
-          fma(S(i, j) * c.a2 * (v.w[i] + v.w[j]), s.spread, g_aligned * s.rate_frame(i, j));
+          fma(S(i, j) * c.a2 * (v.w[i] + v.w[j]), s.spread, of.aligned * s.rate_frame(i, j));
       const V of_strain = a1 * seth_hill_divided_difference(s.h.eps[i], s.h.eps[j], c.n);
       G(i, j) = G(j, i) = fma(S(i, j), of_strain, of_w * inv_e);
     }
@@ -154,8 +131,8 @@ inline void isotropic_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, Vi
     add_symmetric_adjoint(sigma_p, s.h.divided, G, A);
 
     if (grad_C) {
-      Mat3<V> gD = compose(U, v.w, U) * g_aligned + gt * c.b.value +
-                   s.rate * (g_rate_norm * s.inverse_rate_root);
+      Mat3<V> gD = compose(U, v.w, U) * of.aligned + gt * c.b.value +
+                   s.rate * (of.rate_norm * s.inverse_rate_root);
       const V mean = trace(gD) * third, g_rate_trace = fma(sum_S * third, c.b.value, f[3]);
       for (int k = 0; k < 9; k += 4) gD.e[k] = gD.e[k] - mean + g_rate_trace;
       store_mat3<V, T>(grad_C, l, count - l, gD * V(T(kTimeScale)), true);
@@ -169,7 +146,7 @@ inline void isotropic_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, Vi
     const V inv_norm = safe_inverse(strain.norm), share = g.cap.share;
     const V g_ratio = select<V>(g.caps_q, g_scale * share, zero);
     const V g_share = select<V>(g.cuts_q && !g.fluid, g_scale * (g.ratio - one), zero);
-    const V g_rate = g_share * share * (one - share);  // dL/dκ = dL/d(log b̄)
+    const V g_rate = rate_gradient(g.cap, g_share);  // dL/dκ = dL/d(log b̄)
     const V g_c1 = g_ratio * inv_norm * V(e);
     const V g_c2 = select<V>(g.caps_t, g_trace * V(e), zero);
     const V g_norm = -g_ratio * g.ratio * inv_norm;

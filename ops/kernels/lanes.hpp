@@ -80,6 +80,9 @@ template <class V> UNIPHY_INLINE V lane_exp(const V& a) {
 template <class V> UNIPHY_INLINE V lane_log(const V& a) {
   if constexpr (is_scalar_lane<V>) return std::log(a); else return xsimd::log(a);
 }
+template <class V> UNIPHY_INLINE V lane_log1p(const V& a) {
+  if constexpr (is_scalar_lane<V>) return std::log1p(a); else return xsimd::log1p(a);
+}
 template <class V> UNIPHY_INLINE V lane_erf(const V& a) {
   if constexpr (is_scalar_lane<V>) return std::erf(a); else return xsimd::erf(a);
 }

@@ -45,9 +45,9 @@ void table_mlp_backward(const PackedMlp<T>& net, const T* in, T* tape, const T* 
 
 template <class T>
 const LearnedLawTable<T>& learned_law_isa_table() {
-  static constexpr LearnedLawTable<T> kTable{width_of<Lanes<T>>,   learned_scratch<T>,
-                                             learned_evaluate<T>,  learned_adjoint<T>,
-                                             table_mlp_forward<T>, table_mlp_backward<T>};
+  static constexpr LearnedLawTable<T> kTable{learned_scratch<T>, learned_evaluate<T>,
+                                             learned_adjoint<T>, table_mlp_forward<T>,
+                                             table_mlp_backward<T>};
   return kTable;
 }
 

@@ -30,7 +30,7 @@ struct LearnedLaw {
   std::ptrdiff_t accumulator_size() const { return coefficient_sums() + stress.out(); }
 };
 
-/// Where the sums of weight gradients of one layer go: [out, in, lanes] and [out, lanes].
+/// Where the weight gradients of one layer are added: [out, in] and [out].
 template <class T>
 struct WeightGradient {
   T* weight;
@@ -40,7 +40,6 @@ struct WeightGradient {
 /// The learned law's inner loops on one instruction set.
 template <class T>
 struct LearnedLawTable {
-  int lanes;  ///< particles a vector
   /// Scratch numbers of evaluate and adjoint.
   std::ptrdiff_t (*scratch)(const LearnedLaw<T>&);
   /// LawKernel::evaluate of at most kTile particles.

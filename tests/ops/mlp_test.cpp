@@ -7,6 +7,7 @@
 #include <torch/torch.h>
 
 #include "ops/kernels/error.hpp"
+#include "ops/plain_tensors.hpp"
 #include "tests/support/network_cases.hpp"
 
 namespace uniphy::ops {
@@ -36,6 +37,25 @@ TEST_P(MlpTest, ValueAndGradientsMatchPlainTensors) {
   }
 }
 
+TEST_P(MlpTest, CodesOfManySamplesAreCodesBesideEverySample) {
+  for (const std::int64_t samples : {1, 33, 64, 150}) {
+    const auto l = network_layers({3 + 8, 20, 33, 5}, torch::kFloat64);
+    const Tensor features = torch::randn({7, samples, 3}, torch::kFloat64).requires_grad_();
+    const Tensor z = torch::randn({7, 8}, torch::kFloat64).requires_grad_();
+    const Tensor seed = torch::randn({7, samples, 5}, torch::kFloat64);
+    std::vector<Tensor> leaves = network_leaves(features, l);
+    leaves.push_back(z);
+    const Tensor y = mlp(features, z, l, GetParam());
+    const auto got = torch::autograd::grad({y}, leaves, {seed});
+    const PlainTensors plain;
+    const Tensor expected = mlp(features, z, l, GetParam());
+    EXPECT_LE((y - expected).abs().max().item<double>(), 1e-12);
+    const auto want = torch::autograd::grad({expected}, leaves, {seed});
+    for (std::size_t k = 0; k < got.size(); ++k)
+      EXPECT_LE(((got[k] - want[k]).norm() / want[k].norm()).item<double>(), 1e-12) << k;
+  }
+}
+
 TEST_P(MlpTest, GradientsAgreeWithCentralDifferences) {
   const testing::NetworkErrors errors = testing::network_errors(GetParam());
   EXPECT_LE(errors.x, 1e-8);
@@ -48,7 +68,7 @@ TEST_P(MlpTest, PlainVersionStandsInWhileAskedFor) {
   const Tensor x = torch::randn({70, 11});
   const Tensor fused = mlp(x, l, GetParam()), expected = mlp_reference(x, l, GetParam());
   {
-    const PlainMlp plain;
+    const PlainTensors plain;
     EXPECT_TRUE(torch::equal(mlp(x, l, GetParam()), expected));
   }
   EXPECT_TRUE(torch::equal(mlp(x, l, GetParam()), fused));
@@ -57,6 +77,7 @@ TEST_P(MlpTest, PlainVersionStandsInWhileAskedFor) {
 TEST_P(MlpTest, SameBitsOnOneThreadAndTwo) {
   const auto l = network_layers({11, 32, 32, 5}, torch::kFloat32);
   const Tensor x = torch::randn({3001, 11}).requires_grad_();
+  const Tensor features = torch::randn({31, 70, 3}), z = torch::randn({31, 8}).requires_grad_();
   std::vector<std::vector<Tensor>> results;
   const int threads = at::get_num_threads();
   for (const int n : {1, 2}) {
@@ -64,6 +85,10 @@ TEST_P(MlpTest, SameBitsOnOneThreadAndTwo) {
     const Tensor y = mlp(x, l, GetParam());
     results.push_back(torch::autograd::grad({y}, network_leaves(x, l), {torch::ones_like(y)}));
     results.back().push_back(y.detach());
+    const Tensor of_codes = mlp(features, z, l, GetParam());
+    for (const Tensor& g : torch::autograd::grad({of_codes.sum()}, {z, l[0].weight, l[1].bias}))
+      results.back().push_back(g);
+    results.back().push_back(of_codes.detach());
   }
   at::set_num_threads(threads);
   for (std::size_t k = 0; k < results[0].size(); ++k)
@@ -84,6 +109,10 @@ TEST(Mlp, RefusesWhatDoesNotFit) {
     EXPECT_NE(std::string(e.what()).find("expected a weight [out, 5]"), std::string::npos)
         << e.what();
   }
+  EXPECT_THROW(mlp(torch::zeros({3, 40, 2}), torch::zeros({2, 2}), l, kernels::Activation::silu),
+               Error);
+  EXPECT_THROW(mlp(torch::zeros({3, 40, 2}), torch::zeros({3, 3}), l, kernels::Activation::silu),
+               Error);
   EXPECT_THROW(mlp(torch::zeros({4}), l, kernels::Activation::silu), Error);
   EXPECT_THROW(mlp(torch::zeros({3, 4}, torch::kFloat64), l, kernels::Activation::silu), Error);
   EXPECT_THROW(mlp(torch::zeros({3, 4}), {}, kernels::Activation::silu), Error);

@@ -2,11 +2,11 @@
 
 #include <random>
 
-#include "ops/mlp.hpp"
+#include "ops/plain_tensors.hpp"
 #include "uniphy/bench/subjects.hpp"
 #include "uniphy/data/material_ranges.hpp"
 #include "uniphy/training/batches.hpp"
-#include "uniphy/training/objective.hpp"
+#include "uniphy/training/training_step.hpp"
 
 namespace uniphy::bench {
 namespace {
@@ -49,44 +49,35 @@ Dataset make_dataset(std::int64_t trajectories, std::int64_t samples) {
   return data;
 }
 
-/// What a step of Algorithm 1 does, as in training/trainer.cpp.
 struct Training {
   Training(const Dataset& data, std::int64_t batch)
-      : objective(law_columns(data, kernels::LawForm::isotropic), kernels::LawForm::isotropic, 0.1),
+      : objective(law_columns(data, kernels::LawForm::isotropic), kernels::LawForm::isotropic,
+                  {options.error_floor, options.delta}),
         sampler(data, 1),
         batch(batch) {
     torch::Generator generator = torch::make_generator<at::CPUGeneratorImpl>(1);
-    NetworkOptions size;
-    size.state_caps = size.state_moduli = true;  // networks that are asked for every sample
-    networks = Networks::random(size, generator);
-    const std::int64_t n = sampler.trajectories();
-    z = (0.1 * torch::randn({n, networks.options.latent_size}, generator, torch::kFloat32))
-            .requires_grad_();
-    all = torch::arange(n);
-    parameters = networks.parameters();
-    std::vector<Tensor> moved = parameters;
-    moved.push_back(z);
+    // Networks that are asked for every sample.
+    options.network.state_caps = options.network.state_moduli = true;
     // A rate at which nothing moves: every step is the same work.
-    optimizer = std::make_unique<torch::optim::AdamW>(moved, torch::optim::AdamWOptions(1e-9));
+    options.learning_rate = 1e-9;
+    networks = Networks::random(options.network, generator);
+    z = 0.1 * torch::randn({sampler.trajectories(), options.network.latent_size}, generator,
+                           torch::kFloat32);
+    z.requires_grad_();
+    optimizer = std::make_unique<torch::optim::AdamW>(make_optimizer(networks, z, options));
   }
 
   void step() {
-    optimizer->zero_grad();
-    const LawErrors errors = objective.errors(networks, z, sampler.rows(0, batch), all);
-    const Tensor loss = Objective::robust_mean(errors.stress, 1e-3) +
-                        Objective::robust_mean(errors.projection, 1e-3) +
-                        z.pow(2).sum(1).mean() * 1e-4;
-    loss.backward();
-    torch::nn::utils::clip_grad_norm_(parameters, 1);
-    optimizer->step();
+    training_step(objective, networks, z, sampler.rows(0, batch), /*caps_first=*/false, options,
+                  *optimizer);
   }
 
+  TrainingOptions options;
   Objective objective;
   BatchSampler sampler;
   std::int64_t batch;
   Networks networks;
-  Tensor z, all;
-  std::vector<Tensor> parameters;
+  Tensor z;
   std::unique_ptr<torch::optim::AdamW> optimizer;
 };
 
@@ -98,7 +89,7 @@ void bench_train(const BenchOptions& options, int threads, BenchReport& report) 
   Measurer measurer(threads);
   measurer.add("step", [&] { training.step(); });
   measurer.add_baseline("step", [&] {
-    const ops::PlainMlp plain;
+    const ops::PlainTensors plain;
     training.step();
   });
   measurer.run(options.effort);

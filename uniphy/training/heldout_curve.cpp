@@ -18,16 +18,12 @@ Tensor first_codes(const Dataset& data, const TrainingOptions& o) {
   return initial_latents(law_columns(data, o.network.form), o.network, generator);
 }
 
-double median_root(const Tensor& errors) {
-  return errors.detach().mean(1).sqrt().median().item<double>();
-}
-
 }  // namespace
 
 HeldoutCurve::HeldoutCurve(const Dataset& data, const TrainingOptions& options)
     : options_(options),
       objective_(law_columns(data, options.network.form), options.network.form,
-                 options.error_floor),
+                 {options.error_floor, options.delta}),
       sampler_(data, options.seed + kSeedShift),
       z_(first_codes(data, options)),
       optimizer_({z_}, torch::optim::AdamOptions(options.learning_rate).betas({0.9, 0.99})) {}
@@ -45,8 +41,7 @@ HeldoutErrors HeldoutCurve::follow(const Networks& trained, std::int64_t step, d
     optimizer_.zero_grad();
     const LawErrors errors = errors_at(k);
     // A sum over trajectories: each code has its own loss, however many of them there are.
-    const Tensor loss = torch::log1p(errors.stress / options_.delta).mean(1).sum() +
-                        torch::log1p(errors.projection / options_.delta).mean(1).sum();
+    const Tensor loss = errors.stress_loss.sum() + errors.projection_loss.sum();
     const Tensor prior = z_.pow(2).sum() / (options_.latent_sigma * options_.latent_sigma);
     (loss + prior * 1e-2).backward();
     optimizer_.step();

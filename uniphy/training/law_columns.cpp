@@ -8,7 +8,7 @@
 namespace uniphy {
 namespace {
 
-using kernels::HenckyStrain;
+using kernels::IsotropicColumns;
 using Mat3 = kernels::Mat3<double>;
 
 Mat3 load(const std::vector<double>& values, std::int64_t sample) {

@@ -2,25 +2,28 @@
 
 #include <torch/torch.h>
 
-#include <vector>
-
+#include "ops/isotropic_errors.hpp"
 #include "uniphy/training/law_columns.hpp"
 #include "uniphy/training/networks.hpp"
 
 namespace uniphy {
 
-/// Squared errors of a batch, [N, m] each, relative to
+/// The errors of a batch, each [N], means over the samples of a trajectory. A squared error is
+/// relative to
 ///   ‖τ‖² + (floor · RMS of the trajectory)²          (stress)
 ///   decrease² + (floor · RMS of the trajectory)²     (projection; where the trajectory's own RMS
-///   is
-///                                                     0, an elastic one, ‖ε‖² takes its place)
+///                                                     is 0, an elastic one, ‖ε‖² takes its place)
+/// and enters the loss as log(1 + error/δ), so that no trajectory drowns the others.
 struct LawErrors {
+  torch::Tensor stress_loss;
+  torch::Tensor projection_loss;
+  // Isotropic form, else undefined: the projection's loss if the whole of what exceeds the cap were
+  // taken off, and the share that is (formulas: ops/kernels/isotropic_errors_table.hpp).
+  torch::Tensor whole_loss;
+  torch::Tensor share;
+  // The squared errors themselves, for reports: they have no gradient.
   torch::Tensor stress;
   torch::Tensor projection;
-  // Isotropic form, else undefined: the projection's error if the whole of what exceeds the cap
-  // were taken off, and the share that is.
-  torch::Tensor projection_whole;
-  torch::Tensor share;
 };
 
 /// The differentiable errors of the learned law on samples grouped by trajectory; the loss of
@@ -28,31 +31,31 @@ struct LawErrors {
 class Objective {
  public:
   /// Copies the columns into a tensor.
-  Objective(const LawColumns& columns, kernels::LawForm form, double floor);
+  Objective(const LawColumns& columns, kernels::LawForm form, const ops::ErrorMeasure& measure);
 
   /// rows: [N, m] sample indices, row i of trajectory scale_rows[i]; z: [N, latent_size].
   LawErrors errors(const Networks& networks, const torch::Tensor& z, const torch::Tensor& rows,
                    const torch::Tensor& scale_rows) const;
 
-  /// mean log(1 + error/δ) of both kinds, a logarithm so that no trajectory drowns the others.
-  static torch::Tensor robust_mean(const torch::Tensor& errors, double delta);
-
-  /// The projection's loss of every trajectory, [N]: mean log(1 + error/δ), of the law as it is or
-  /// of one that returns the whole way, whichever is less; the latter pulls the share to 1. As long
-  /// as a cap is far off, a share near 0 is the easy way out, and a trap; a trajectory that returns
-  /// the whole way never has to take it. `caps_first`: only the latter.
-  static torch::Tensor projection_loss(const LawErrors& errors, double delta, bool caps_first);
+  /// The loss of every trajectory, [N]: that of the stress, and that of the projection, of the law
+  /// as it is or of one that returns the whole way, whichever is less; the latter pulls the share
+  /// to 1. As long as a cap is far off, a share near 0 is the easy way out, and a trap; a
+  /// trajectory that returns the whole way never has to take it. `caps_first`: only the latter.
+  static torch::Tensor loss(const LawErrors& errors, bool caps_first);
 
  private:
-  LawErrors isotropic(const Networks& networks, const torch::Tensor& z, const torch::Tensor& batch,
+  LawErrors isotropic(const Networks& networks, const torch::Tensor& z, const torch::Tensor& rows,
                       const torch::Tensor& scale) const;
-  LawErrors seed(const Networks& networks, const torch::Tensor& z, const torch::Tensor& batch,
+  LawErrors seed(const Networks& networks, const torch::Tensor& z, const torch::Tensor& rows,
                  const torch::Tensor& scale) const;
 
   kernels::LawForm form_;
-  double floor_;
+  ops::ErrorMeasure measure_;
   torch::Tensor columns_;  ///< [S, columns]
   torch::Tensor scales_;   ///< [N, 3]: stress, strain, decrease
 };
+
+/// Of a report: the median over trajectories of the root of squared errors, [N].
+double median_root(const torch::Tensor& errors);
 
 }  // namespace uniphy

@@ -12,6 +12,7 @@
 #include "uniphy/training/heldout_curve.hpp"
 #include "uniphy/training/initial_latents.hpp"
 #include "uniphy/training/training_checkpoint.hpp"
+#include "uniphy/training/training_step.hpp"
 
 namespace uniphy {
 namespace {
@@ -19,7 +20,7 @@ namespace {
 using torch::Tensor;
 
 constexpr std::int64_t kReportEvery = 100;
-constexpr double kCapsFirst = 0.3;  ///< share of the steps, see Objective::projection_loss
+constexpr double kCapsFirst = 0.3;  ///< share of the steps, see Objective::loss
 
 double cosine(double rate, std::int64_t step, std::int64_t steps) {
   // A short warm-up: AdamW's first steps are as large as the rate whatever the gradient.
@@ -46,29 +47,14 @@ std::string note_of(const TrainingPoint& p) {
   return {note, note + length};
 }
 
-double median_of(const Tensor& values) { return values.median().item<double>(); }
-
-torch::optim::AdamW make_optimizer(const Networks& networks, const Tensor& z,
-                                   const TrainingOptions& o) {
-  const auto options = [](double rate, double decay) {
-    return std::make_unique<torch::optim::AdamWOptions>(
-        torch::optim::AdamWOptions(rate).weight_decay(decay).betas({0.9, 0.99}));
-  };
-  std::vector<torch::optim::OptimizerParamGroup> groups;
-  groups.emplace_back(networks.parameters(), options(o.learning_rate, o.weight_decay));
-  groups.emplace_back(std::vector<Tensor>{z}, options(o.learning_rate * o.latent_rate, 0.0));
-  return torch::optim::AdamW(groups);
-}
-
 }  // namespace
 
 TrainingResult train(const Dataset& data, const TrainingOptions& o,
                      const std::filesystem::path& checkpoint, const Dataset* heldout) {
   const auto start = std::chrono::steady_clock::now();
   const LawColumns columns = law_columns(data, o.network.form);
-  const Objective objective(columns, o.network.form, o.error_floor);
+  const Objective objective(columns, o.network.form, {o.error_floor, o.delta});
   const BatchSampler sampler(data, o.seed);
-  const std::int64_t n = sampler.trajectories();
   torch::Generator generator = torch::make_generator<at::CPUGeneratorImpl>(o.seed);
   TrainingResult result;
   result.networks = Networks::random(o.network, generator);
@@ -83,8 +69,6 @@ TrainingResult train(const Dataset& data, const TrainingOptions& o,
     result.seconds = before + seconds_since(start);
     state.save(at);
   };
-  const Tensor all = torch::arange(n);
-  const std::vector<Tensor> parameters = result.networks.parameters();
 
   catch_interrupts();
   Progress progress("train", o.steps, "steps");
@@ -95,27 +79,19 @@ TrainingResult train(const Dataset& data, const TrainingOptions& o,
     }
     set_rate(optimizer, 0, cosine(o.learning_rate, step, o.steps));
     set_rate(optimizer, 1, cosine(o.learning_rate * o.latent_rate, step, o.steps));
-    optimizer.zero_grad();
-    const LawErrors errors = objective.errors(result.networks, result.z,
-                                              sampler.rows(step, o.batch_per_trajectory), all);
     const bool caps_first = double(step) < kCapsFirst * double(o.steps);
-    const Tensor prior = result.z.pow(2).sum(1).mean() / (o.latent_sigma * o.latent_sigma);
-    const Tensor loss = Objective::robust_mean(errors.stress, o.delta) +
-                        Objective::projection_loss(errors, o.delta, caps_first).mean() +
-                        prior * 1e-2;
-    loss.backward();
-    torch::nn::utils::clip_grad_norm_(parameters, o.clip);
-    optimizer.step();
+    const TrainingStep now =
+        training_step(objective, result.networks, result.z,
+                      sampler.rows(step, o.batch_per_trajectory), caps_first, o, optimizer);
     if (step % kReportEvery == 0 || step + 1 == o.steps) {
-      result.history.push_back({step, loss.item<double>(),
-                                median_of(errors.stress.detach().mean(1).sqrt()),
-                                median_of(errors.projection.detach().mean(1).sqrt())});
+      result.history.push_back({step, now.loss.item<double>(), median_root(now.errors.stress),
+                                median_root(now.errors.projection)});
       TrainingPoint& p = result.history.back();
       if (curve) {
         const double rate = cosine(o.learning_rate * o.latent_rate, step, o.steps);
-        const HeldoutErrors now = curve->follow(result.networks, step, rate);
-        p.heldout_stress_error = now.stress;
-        p.heldout_projection_error = now.projection;
+        const HeldoutErrors held_out = curve->follow(result.networks, step, rate);
+        p.heldout_stress_error = held_out.stress;
+        p.heldout_projection_error = held_out.projection;
       }
       progress.update(step, note_of(p));
     }
@@ -130,14 +106,12 @@ Tensor fit_latents(const Dataset& data, const Networks& trained, const Tensor& t
                    const LatentFitOptions& o) {
   const Networks networks = trained.frozen();
   const Objective objective(law_columns(data, networks.options.form), networks.options.form,
-                            o.error_floor);
+                            {o.error_floor, o.delta});
   const BatchSampler sampler(data, o.seed);
   const std::int64_t n = sampler.trajectories(), codes = training_z.size(0);
   const std::int64_t starts = std::min(o.starts, codes);
   const auto loss_of = [&](const Tensor& z, const Tensor& rows, const Tensor& of) {
-    const LawErrors e = objective.errors(networks, z, rows, of);
-    return torch::log1p(e.stress / o.delta).mean(1) +
-           Objective::projection_loss(e, o.delta, /*caps_first=*/false);
+    return Objective::loss(objective.errors(networks, z, rows, of), /*caps_first=*/false);
   };
   // Which training codes answer best, a code at a time against all trajectories.
   Tensor scores = torch::empty({codes, n});

@@ -25,7 +25,7 @@ struct TrainingOptions {
   double weight_decay = 1e-6;
   double latent_sigma = 10;  ///< σ of the prior ‖z‖²/σ²
   double error_floor = 0.1;  ///< see LawErrors
-  double delta = 1e-3;       ///< see Objective::robust_mean
+  double delta = 1e-3;       ///< δ of log(1 + error/δ), see LawErrors
   double clip = 1;           ///< largest norm of the networks' gradient
   std::int64_t checkpoint_every = 500;
 };

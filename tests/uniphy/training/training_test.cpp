@@ -108,9 +108,11 @@ TEST_F(TrainingTest, ObjectiveIsTheKernelsError) {
     NetworkOptions options = small_options(form).network;
     const Networks networks = Networks::random(options, generator);
     const Tensor z = torch::randn({4, 4}, generator, torch::kFloat32) * 0.3;
-    const Objective objective(law_columns(data, form), form, 1e-6);
-    const Tensor rows = torch::arange(160).view({4, 40});
-    const LawErrors errors = objective.errors(networks, z, rows, torch::arange(4));
+    const Objective objective(law_columns(data, form), form, {1e-6, 1e-3});
+    // Errors are means over the samples of a trajectory; here each sample is one of its own.
+    const Tensor of = torch::arange(4).repeat_interleave(40);
+    const LawErrors errors =
+        objective.errors(networks, z.index_select(0, of), torch::arange(160).view({160, 1}), of);
     const auto weights = std::make_shared<kernels::LearnedLawWeights>(networks.weights());
     const auto stress_only = kernels::without_projection(*weights);
     for (int i = 0; i < 4; ++i) {
@@ -133,7 +135,7 @@ TEST_F(TrainingTest, ObjectiveIsTheKernelsError) {
         }
         if (size < 1e-3) continue;  // float32 columns hold no relative error of nothing
         const double expected = difference / size;
-        EXPECT_NEAR(errors.stress[i][s].item<double>(), expected, 2e-3 * expected + 1e-5)
+        EXPECT_NEAR(errors.stress[40 * i + s].item<double>(), expected, 2e-3 * expected + 1e-5)
             << kernels::form_name(form) << " trajectory " << i << " sample " << s;
       }
     }

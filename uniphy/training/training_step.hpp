@@ -1,0 +1,24 @@
+#pragma once
+
+#include <torch/torch.h>
+
+#include "uniphy/training/objective.hpp"
+#include "uniphy/training/trainer.hpp"
+
+namespace uniphy {
+
+/// AdamW on the weights (group 0) and on the codes z (group 1, without decay).
+torch::optim::AdamW make_optimizer(const Networks& networks, const torch::Tensor& z,
+                                   const TrainingOptions& options);
+
+struct TrainingStep {
+  torch::Tensor loss;  ///< before the step
+  LawErrors errors;
+};
+/// One step of Algorithm 1 on the samples `rows` [N, m] of all trajectories: the loss, its
+/// gradient, and the optimizer's step. caps_first: see Objective::loss.
+TrainingStep training_step(const Objective& objective, const Networks& networks,
+                           const torch::Tensor& z, const torch::Tensor& rows, bool caps_first,
+                           const TrainingOptions& options, torch::optim::AdamW& optimizer);
+
+}  // namespace uniphy
