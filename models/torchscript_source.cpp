@@ -116,7 +116,7 @@ def project(self, F: Tensor, z: Tensor) -> Tensor:
     over_t = t > c2
     one = torch.ones_like(norm)
     stretch = torch.clamp(sigma, min=MINIMUM_STRETCH)
-    share = 1.0 / (1.0 + torch.exp(-torch.clamp(c[:, 3], min=-40.0, max=40.0)) / (stretch * stretch).mean(1))
+    share = 1.0 / (1.0 + torch.clamp(self.sinh_of(c[:, 3]) / (stretch * stretch).mean(1), min=LEAST_VISCOSITY))
     ratio = torch.clamp(c1, min=0.0) / torch.where(norm > 0.0, norm, one)
     scale = torch.where(over, 1.0 - share + share * ratio, one)
     y = (scale.unsqueeze(1) * w + (torch.where(over_t, c2, t) / 3.0).unsqueeze(1)) * e.unsqueeze(1)
@@ -267,6 +267,7 @@ std::string script_source(const kernels::LearnedLawWeights& weights, bool single
   text = replaced(text, "TIME_SCALE", literal(kernels::kTimeScale));
   text = replaced(text, "MINIMUM_STRETCH", literal(kernels::kMinimumStretch));
   text = replaced(text, "SMOOTHING", literal(kernels::kInvariantSmoothing));
+  text = replaced(text, "LEAST_VISCOSITY", literal(kernels::kLeastViscosity));
   text = replaced(text, "SINH_LIMIT", literal(kernels::kSinhLimit));
   text = replaced(text, "EXPONENT_LIMIT", literal(kernels::kExponentLimit));
   text = replaced(text, "ARGUMENT_LIMIT", literal(kernels::kArgumentLimit));

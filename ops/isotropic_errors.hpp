@@ -29,7 +29,7 @@ IsotropicFeatures isotropic_features(const IsotropicBatch& batch, const torch::T
 /// The networks' answers, to every sample or ([N, 1, ...]) to z alone, and those at rest, of which
 /// c₂ and a₀ are taken off.
 struct IsotropicAnswers {
-  torch::Tensor caps;         ///< c₀, c₂, m, κ: [N, m or 1, 4]
+  torch::Tensor caps;         ///< c₀, c₂, m, η̃: [N, m or 1, 4]
   torch::Tensor caps_rest;    ///< [N, 1, 4]
   torch::Tensor moduli;       ///< k̃, a₀, ã₁, a₂, b̃, n, γ, δ: [N, m or 1, 8]
   torch::Tensor moduli_rest;  ///< [N, 1, 8]

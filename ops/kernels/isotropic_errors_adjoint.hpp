@@ -44,7 +44,7 @@ UNIPHY_INLINE CapGradients<V> projection_errors_adjoint(const ProjectionErrors<V
   g.output[0] = g_c1;
   g.output[1] = g_c2;
   g.output[2] = g_c1 * p.cap.per_m;
-  g.output[3] = rate_gradient(p.cap, g_share);
+  g.output[3] = g_share * p.cap.per_viscosity;
   g.c2 = g_c2;
   // Q = e c₁ and T = e c₂; c₁ itself sees t/e.
   g.log_e = g_q * p.cap_q + g_c2 * p.cap.c2 - g_c1 * p.cap.slope * p.trial.trace / e;

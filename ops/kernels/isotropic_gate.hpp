@@ -64,44 +64,43 @@ UNIPHY_INLINE SinhOf<V> sinh_of(const V& output) {
 template <class V>
 struct Caps {
   V c1, c2;
-  V slope;        ///< sinh m = dc₁/d(t/e)
-  V per_m;        ///< dc₁/dm
-  V share;        ///< r
-  V mean_square;  ///< b̄
+  V slope;           ///< sinh m = dc₁/d(t/e)
+  V per_m;           ///< dc₁/dm
+  V share;           ///< r
+  V per_viscosity;   ///< dr/dη̃
+  V per_log_square;  ///< dr/d(log b̄)
+  V mean_square;     ///< b̄
 };
 /// What the projection network answers, as far as it does not depend on the state.
 template <class V>
 struct CapOutputs {
   V c0, c2;
-  SinhOf<V> slope;
-  V odds;  ///< exp(−κ)
+  SinhOf<V> slope, viscosity;  ///< of m and η̃
 };
 template <class V>
-UNIPHY_INLINE CapOutputs<V> cap_outputs(const V& c0, const V& c2, const V& m, const V& kappa) {
-  using T = ScalarOf<V>;
-  // Half the range of exp, so that neither it nor its square overflows in float.
-  const V rate = lane_max(lane_min(kappa, V(T(40))), V(T(-40)));
-  return {c0, c2, sinh_of(m), lane_exp(-rate)};
+UNIPHY_INLINE CapOutputs<V> cap_outputs(const V& c0, const V& c2, const V& m, const V& eta) {
+  return {c0, c2, sinh_of(m), sinh_of(eta)};
 }
 /// t: tr ε/e; `rest`: what c₂ has taken off.
 template <class V>
 UNIPHY_INLINE Caps<V> caps(const CapOutputs<V>& c, const V& rest, const V& t,
                            const Vec3<V>& stretch) {
   using T = ScalarOf<V>;
-  const V one = V(T(1));
+  const V zero = V(T(0));
   Caps<V> r;
   r.slope = c.slope.value;
   r.per_m = c.slope.slope * t;
   r.c1 = fma(r.slope, t, c.c0);
   r.c2 = c.c2 - rest;
   r.mean_square = dot(stretch, stretch) * V(T(1.0 / 3));
-  r.share = one / (one + c.odds / r.mean_square);
+  const V least = V(T(kLeastViscosity)) * r.mean_square;
+  const auto free = c.viscosity.value > least;
+  const V inverse = V(T(1)) / (r.mean_square + lane_max(c.viscosity.value, least));
+  r.share = r.mean_square * inverse;
+  const V slope = select<V>(free, r.share * inverse, zero);
+  r.per_viscosity = -slope * c.viscosity.slope;
+  r.per_log_square = slope * c.viscosity.value;
   return r;
-}
-/// dL/dκ, given dL/dr; also dL/d(log b̄).
-template <class V>
-UNIPHY_INLINE V rate_gradient(const Caps<V>& cap, const V& g_share) {
-  return g_share * cap.share * (V(ScalarOf<V>(1)) - cap.share);
 }
 /// `c`, `features`: the planes of a tile from lane l on, outputs and inputs of the projection.
 template <class V, class T>

@@ -8,8 +8,8 @@
 //
 // With ε = log Σ, t = tr ε, ε̂ its deviator, w = ε̂/e with the strain scale e of z, and the smooth
 // invariants q ≈ ‖w‖ and ℓ ≈ Σ wᵢ³/‖w‖² (StrainInvariants):
-//   projection  (c₀, c₂, m, κ) = g_φ(t/e, q, ℓ, z);  c₁ = c₀ + sinh(m) t/e,
-//               ‖ε̂‖' = ‖ε̂‖ − r max(‖ε̂‖ − e max(c₁, 0), 0),  r = 1/(1 + exp(−κ)/b̄),  b̄ = tr(Σ²)/3,
+//   projection  (c₀, c₂, m, η̃) = g_φ(t/e, q, ℓ, z);  c₁ = c₀ + sinh(m) t/e,
+//               ‖ε̂‖' = ‖ε̂‖ − r max(‖ε̂‖ − e max(c₁, 0), 0),  r = 1/(1 + sinh(η̃)/b̄),  b̄ = tr(Σ²)/3,
 //               t' = min(t, e c₂),  log Σ' = ‖ε̂‖' ε̂/‖ε̂‖ + t'/3;  F_proj = F bit for bit below
 //               both caps, and exp(t'/3) I where c₁ < −½ and t is below its cap
 //   stress      (k̃, a₀, ã₁, a₂, b̃, n, γ, δ) = f_θ(t/e, q, ℓ, tr D, d, x, z) of the projected F,
@@ -20,16 +20,17 @@
 //
 // The caps are what makes the laws easy: von Mises is a constant c₀; Drucker–Prager a constant m
 // with c₂ = 0 (its apex included: c₁ < 0 where t > 0; the slope spans decades with λ/μ, hence the
-// sinh); a viscoplastic law returns by the share r = 1/(1 + η/(2μ b̄ Δt)) of the way, a constant κ
-// (J. C. Simo, C. Miehe, CMAME 98, 1992, for b̄); a fluid is c₁ < 0, an elastic body has both caps
-// out of reach. A fluid's F forgets its shape, and with it its orientation: only F Fᵀ enters the
-// stress and the next F Fᵀ, so that dropping the rotation moves nothing. Likewise k, a₁, b and the
-// exponents are constants for StVK–Hencky (n = γ = δ = 0) and neo-Hookean solids (n = 2), for a
-// liquid's equation of state and for a viscous stress. So the networks may answer to z alone: where
-// the weights of their state features are all zero, they are asked once, not for every particle.
-// c₂ has min(c₂(rest), 0) and a₀ its own answer at F = I, C = 0 taken off, so that
-// nothing yields or moves at rest, whatever the training left. Both maps are exactly
-// frame-indifferent. The adjoint goes by divided differences (spectral.hpp).
+// sinh); a viscoplastic law returns by the share r = 1/(1 + η/(2μ b̄ Δt)) of the way, a constant η̃
+// (J. C. Simo, C. Miehe, CMAME 98, 1992, for b̄), which is 0 where all of it is returned at once; r
+// may exceed 1 by a little, so that a training finds that 0 from both sides; a fluid is c₁ < 0, an
+// elastic body has both caps out of reach. A fluid's F forgets its shape, and with it its
+// orientation: only F Fᵀ enters the stress and the next F Fᵀ, so that dropping the rotation moves
+// nothing. Likewise k, a₁, b and the exponents are constants for StVK–Hencky (n = γ = δ = 0) and
+// neo-Hookean solids (n = 2), for a liquid's equation of state and for a viscous stress. So the
+// networks may answer to z alone: where the weights of their state features are all zero, they are
+// asked once, not for every particle. c₂ has min(c₂(rest), 0) and a₀ its own answer at F = I, C = 0
+// taken off, so that nothing yields or moves at rest, whatever the training left. Both maps are
+// exactly frame-indifferent. The adjoint goes by divided differences (spectral.hpp).
 
 namespace uniphy::kernels {
 inline namespace UNIPHY_ISA {

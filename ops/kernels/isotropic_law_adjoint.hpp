@@ -146,7 +146,6 @@ inline void isotropic_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, Vi
     const V inv_norm = safe_inverse(strain.norm), share = g.cap.share;
     const V g_ratio = select<V>(g.caps_q, g_scale * share, zero);
     const V g_share = select<V>(g.cuts_q && !g.fluid, g_scale * (g.ratio - one), zero);
-    const V g_rate = rate_gradient(g.cap, g_share);  // dL/dκ = dL/d(log b̄)
     const V g_c1 = g_ratio * inv_norm * V(e);
     const V g_c2 = select<V>(g.caps_t, g_trace * V(e), zero);
     const V g_norm = -g_ratio * g.ratio * inv_norm;
@@ -157,13 +156,13 @@ inline void isotropic_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, Vi
     D = select3(g.fluid, zero3<V>(), D);
     add_strain_gradient(strain, g_dev, g_trace, D);
     // b̄ = Σ max(σ, floor)²/3, and slope is 1/σ where σ moves it.
-    const V g_square = two * third * g_rate / g.cap.mean_square;
+    const V g_square = two * third * g_share * g.cap.per_log_square / g.cap.mean_square;
     for (int i = 0; i < 3; ++i)
       D(i, i) = fma(g_square * strain.stretch[i] * strain.stretch[i], strain.slope[i], D(i, i));
     store_plane(tile.grad_projection, l, g_c1);
     store_plane(tile.grad_projection + kTile, l, g_c2);
     store_plane(tile.grad_projection + 2 * kTile, l, g_c1 * g.cap.per_m);
-    store_plane(tile.grad_projection + 3 * kTile, l, g_rate);
+    store_plane(tile.grad_projection + 3 * kTile, l, g_share * g.cap.per_viscosity);
     // What c₁ owes to t/e directly waits for the network's own part.
     store_plane(tile.grad_direct, l, g_c1 * g.cap.slope);
     sum_cap = sum_cap + g_c2;

@@ -71,6 +71,7 @@ inline constexpr double kStrainRate = 2.0;
 inline constexpr double kTimeScale = 0.05;           ///< s, D = sym(C) kTimeScale
 inline constexpr double kInvariantSmoothing = 0.05;  ///< d: rounds the kink of the norms at 0
 inline constexpr double kSinhLimit = 12;             ///< of outputs whose sinh is a coefficient
+inline constexpr double kLeastViscosity = -0.2;  ///< of sinh(η̃)/b̄: the share is at most 1.25
 inline constexpr double kExponentLimit = 4;  ///< of outputs that are exponents of strain measures
 inline constexpr double kArgumentLimit = 30;  ///< of their |γ x| and |δ x|: float does not overflow
 inline constexpr double kFluidCap = -0.5;  ///< c₁ below which a material has no strength at all

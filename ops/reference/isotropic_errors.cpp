@@ -75,7 +75,8 @@ ProjectionErrors projection_errors(const Tensor& batch, const Tensor& scales, co
   const Tensor cap_t = e * (c.select(2, 1) - answers.caps_rest.select(2, 1).clamp_max(0.0));
   const Tensor mean_square =
       torch::exp(2.0 * (deviator + trace.unsqueeze(2) / 3.0)).mean(2);  // b̄, where nothing clamps
-  const Tensor share = 1.0 / (1.0 + torch::exp(-c.select(2, 3).clamp(-40, 40)) / mean_square);
+  const Tensor share =
+      1.0 / (1.0 + (sinh_of(c.select(2, 3)) / mean_square).clamp_min(kernels::kLeastViscosity));
   const Tensor norm = deviator.norm(2, 2);
   const Tensor norm_kind = column(batch, Column::norm_yields);
   const Tensor norm_decrease = column(batch, Column::norm_decrease);

@@ -185,7 +185,8 @@ IsotropicCaps isotropic_caps(const LearnedLawTensors& law, const Tensor& H, cons
   IsotropicCaps caps;
   caps.c1 = c.select(1, 0) + slope * v.t;
   caps.c2 = c.select(1, 1) - rest;
-  caps.share = 1 / (1 + (-c.select(1, 3).clamp(-40, 40)).exp() / mean_square);
+  caps.share =
+      1 / (1 + (sinh_of(c.select(1, 3)) / mean_square).clamp_min(kernels::kLeastViscosity));
   return caps;
 }
 

@@ -40,17 +40,17 @@ MlpWeights linear(int in, std::vector<double> bias) {
   return {{layer}};
 }
 
-constexpr double kWholeWay = 40;  ///< κ of a law that returns to its cap at once
+constexpr double kWholeWay = 0;  ///< η̃ of a law that returns to its cap at once
 
 /// The isotropic form of the StVK-Hencky solid τ = 2μ ε + λ tr ε, with the caps c₁ + slope t/e and
-/// c₂ and the return rate κ.
+/// c₂ and the viscosity η̃.
 LearnedLawWeights hencky_solid(double mu, double lambda, double c1, double c2, double slope = 0,
-                               double rate = kWholeWay) {
+                               double viscosity = kWholeWay) {
   const double strain_over_stress = kernels::kStrainScale / kernels::kStressScale;
   LearnedLawWeights w;
   w.form = LawForm::isotropic;
   w.latent_size = 2;  // z = 0: the scales are their constants
-  w.projection = linear(3 + 2, {c1, c2, std::asinh(slope), rate});
+  w.projection = linear(3 + 2, {c1, c2, std::asinh(slope), viscosity});
   w.stress = linear(6 + 2, {std::asinh(lambda * strain_over_stress), 0,
                             std::asinh(2 * mu * strain_over_stress), 0, 0, 0, 0, 0});
   return w;
@@ -146,7 +146,7 @@ TEST(LearnedLaw, WithACapAndARateIsNonNewtonian) {
   const double mu = 1e5, lambda = 2e5, tau_y = 7e3, eta = 30, dt = 1e-4;  // dt of difference()
   const double cap = tau_y / (2 * mu) / kernels::kStrainScale;
   const auto learned = kernels::make_law<double>(
-      described(hencky_solid(mu, lambda, cap, 1e6, 0, std::log(2 * mu * dt / eta)), {0, 0}));
+      described(hencky_solid(mu, lambda, cap, 1e6, 0, std::asinh(eta / (2 * mu * dt))), {0, 0}));
   LawDescription d;
   d.id = LawId::non_newtonian;
   d.mu = mu;

@@ -68,7 +68,7 @@ struct Training {
   }
 
   void step() {
-    training_step(objective, networks, z, sampler.rows(0, batch), /*caps_first=*/false, options,
+    training_step(objective, networks, z, sampler.rows(0, batch), ReturnStage::actual, options,
                   *optimizer);
   }
 

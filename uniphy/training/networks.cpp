@@ -5,9 +5,6 @@
 namespace uniphy {
 namespace {
 
-/// κ of a new law: it returns nearly all the way to the cap.
-constexpr double kInitialRate = 3;
-
 using kernels::MlpWeights;
 using ops::LinearLayer;
 
@@ -63,7 +60,6 @@ Networks Networks::random(const NetworkOptions& options, torch::Generator& gener
   n.stress = random_mlp(shape.stress_in, shape.stress_out, options, generator);
   if (options.form == kernels::LawForm::isotropic) {
     torch::NoGradGuard no_grad;
-    n.projection.back().bias[3].fill_(kInitialRate);
     if (!options.state_caps) n.projection.front().weight.narrow(1, 0, shape.projection_in).zero_();
     if (!options.state_moduli) n.stress.front().weight.narrow(1, 0, shape.stress_in).zero_();
     // Between the materials' exponents, and off γ = 0, where the derivative to γ vanishes.

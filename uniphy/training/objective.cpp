@@ -14,9 +14,6 @@ Tensor network(const std::vector<ops::LinearLayer>& layers, const Networks& netw
   return ops::mlp(features, z, layers, networks.options.activation);
 }
 
-/// Pulls the share of a trajectory that returns the whole way to 1.
-constexpr double kReturnWhole = 1;
-
 }  // namespace
 
 Objective::Objective(const LawColumns& columns, kernels::LawForm form,
@@ -90,10 +87,11 @@ LawErrors Objective::seed(const Networks& networks, const Tensor& z, const Tenso
           {},           stress.detach().mean(1), projection.detach().mean(1)};
 }
 
-Tensor Objective::loss(const LawErrors& e, bool caps_first) {
-  if (!e.share.defined()) return e.stress_loss + e.projection_loss;
-  const Tensor whole = e.whole_loss + kReturnWhole * (1.0 - e.share);
-  return e.stress_loss + (caps_first ? whole : torch::minimum(e.projection_loss, whole));
+Tensor Objective::loss(const LawErrors& e, ReturnStage stage) {
+  if (!e.share.defined() || stage == ReturnStage::actual) return e.stress_loss + e.projection_loss;
+  const Tensor whole = e.whole_loss + (1.0 - e.share).abs();
+  return e.stress_loss +
+         (stage == ReturnStage::whole ? whole : torch::minimum(e.projection_loss, whole));
 }
 
 double median_root(const Tensor& errors) { return errors.sqrt().median().item<double>(); }

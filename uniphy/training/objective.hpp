@@ -26,6 +26,13 @@ struct LawErrors {
   torch::Tensor projection;
 };
 
+/// Which projection is judged: that of the law as it is (`actual`), of one that returns the whole
+/// way to its caps and has its share pulled to 1 (`whole`), or whichever is less (`either`). As
+/// long as a cap is far off, a share near 0 is the easy way out, and a trap; so a training looks at
+/// the caps alone first, and then lets each trajectory have a share of its own where that is
+/// better.
+enum class ReturnStage { whole, either, actual };
+
 /// The differentiable errors of the learned law on samples grouped by trajectory; the loss of
 /// Algorithm 1 and of a latent fit.
 class Objective {
@@ -37,11 +44,8 @@ class Objective {
   LawErrors errors(const Networks& networks, const torch::Tensor& z, const torch::Tensor& rows,
                    const torch::Tensor& scale_rows) const;
 
-  /// The loss of every trajectory, [N]: that of the stress, and that of the projection, of the law
-  /// as it is or of one that returns the whole way, whichever is less; the latter pulls the share
-  /// to 1. As long as a cap is far off, a share near 0 is the easy way out, and a trap; a
-  /// trajectory that returns the whole way never has to take it. `caps_first`: only the latter.
-  static torch::Tensor loss(const LawErrors& errors, bool caps_first);
+  /// The loss of every trajectory, [N]: that of the stress, and that of the projection.
+  static torch::Tensor loss(const LawErrors& errors, ReturnStage stage);
 
  private:
   LawErrors isotropic(const Networks& networks, const torch::Tensor& z, const torch::Tensor& rows,

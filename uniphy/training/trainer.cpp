@@ -20,7 +20,7 @@ namespace {
 using torch::Tensor;
 
 constexpr std::int64_t kReportEvery = 100;
-constexpr double kCapsFirst = 0.3;  ///< share of the steps, see Objective::loss
+constexpr double kCapsFirst = 0.7;  ///< part of the steps, see ReturnStage
 
 double cosine(double rate, std::int64_t step, std::int64_t steps) {
   // A short warm-up: AdamW's first steps are as large as the rate whatever the gradient.
@@ -80,9 +80,10 @@ TrainingResult train(const Dataset& data, const TrainingOptions& o,
     set_rate(optimizer, 0, cosine(o.learning_rate, step, o.steps));
     set_rate(optimizer, 1, cosine(o.learning_rate * o.latent_rate, step, o.steps));
     const bool caps_first = double(step) < kCapsFirst * double(o.steps);
+    const ReturnStage stage = caps_first ? ReturnStage::whole : ReturnStage::either;
     const TrainingStep now =
         training_step(objective, result.networks, result.z,
-                      sampler.rows(step, o.batch_per_trajectory), caps_first, o, optimizer);
+                      sampler.rows(step, o.batch_per_trajectory), stage, o, optimizer);
     if (step % kReportEvery == 0 || step + 1 == o.steps) {
       result.history.push_back({step, now.loss.item<double>(), median_root(now.errors.stress),
                                 median_root(now.errors.projection)});
@@ -110,8 +111,9 @@ Tensor fit_latents(const Dataset& data, const Networks& trained, const Tensor& t
   const BatchSampler sampler(data, o.seed);
   const std::int64_t n = sampler.trajectories(), codes = training_z.size(0);
   const std::int64_t starts = std::min(o.starts, codes);
-  const auto loss_of = [&](const Tensor& z, const Tensor& rows, const Tensor& of) {
-    return Objective::loss(objective.errors(networks, z, rows, of), /*caps_first=*/false);
+  const auto loss_of = [&](const Tensor& z, const Tensor& rows, const Tensor& of,
+                           ReturnStage stage = ReturnStage::either) {
+    return Objective::loss(objective.errors(networks, z, rows, of), stage);
   };
   // Which training codes answer best, a code at a time against all trajectories.
   Tensor scores = torch::empty({codes, n});
@@ -139,7 +141,8 @@ Tensor fit_latents(const Dataset& data, const Networks& trained, const Tensor& t
   }
   progress.finish();
   torch::NoGradGuard no_grad;
-  const Tensor final_scores = loss_of(z, sampler.rows(-2, 256).repeat({starts, 1}), of);
+  const Tensor final_scores =
+      loss_of(z, sampler.rows(-2, 256).repeat({starts, 1}), of, ReturnStage::actual);
   const Tensor winner = final_scores.view({starts, n}).argmin(0);  // [n]
   return z.detach().index_select(0, winner * n + torch::arange(n));
 }

@@ -23,13 +23,13 @@ torch::optim::AdamW make_optimizer(const Networks& networks, const Tensor& z,
 }
 
 TrainingStep training_step(const Objective& objective, const Networks& networks, const Tensor& z,
-                           const Tensor& rows, bool caps_first, const TrainingOptions& o,
+                           const Tensor& rows, ReturnStage stage, const TrainingOptions& o,
                            torch::optim::AdamW& optimizer) {
   optimizer.zero_grad();
   TrainingStep step;
   step.errors = objective.errors(networks, z, rows, torch::arange(z.size(0)));
   const Tensor prior = z.pow(2).sum(1).mean() / (o.latent_sigma * o.latent_sigma);
-  step.loss = Objective::loss(step.errors, caps_first).mean() + prior * kPriorWeight;
+  step.loss = Objective::loss(step.errors, stage).mean() + prior * kPriorWeight;
   step.loss.backward();
   torch::nn::utils::clip_grad_norm_(networks.parameters(), o.clip);
   optimizer.step();

@@ -16,9 +16,9 @@ struct TrainingStep {
   LawErrors errors;
 };
 /// One step of Algorithm 1 on the samples `rows` [N, m] of all trajectories: the loss, its
-/// gradient, and the optimizer's step. caps_first: see Objective::loss.
+/// gradient, and the optimizer's step.
 TrainingStep training_step(const Objective& objective, const Networks& networks,
-                           const torch::Tensor& z, const torch::Tensor& rows, bool caps_first,
+                           const torch::Tensor& z, const torch::Tensor& rows, ReturnStage stage,
                            const TrainingOptions& options, torch::optim::AdamW& optimizer);
 
 }  // namespace uniphy

@@ -118,7 +118,7 @@ TEST_P(IsotropicErrorsOnIsa, GradientsAgreeWithCentralDifferences) {
 TEST_P(IsotropicErrorsOnIsa, TheShareHasItsGradientWhereTheLawCuts) {
   const auto& table = isotropic_errors_table<double>(GetParam());
   for (IsotropicErrorCase c : testing::isotropic_error_cases()) {
-    // κ alone, on samples of the two kinds that the law cuts.
+    // η̃ alone, on samples of the two kinds that the law cuts.
     for (std::int64_t& row : c.rows) row = row % 3 == 0 ? row + 1 : row;
     Trajectory<double> t(c);
     const auto loss = [&](const std::vector<double>& x) {
