@@ -40,9 +40,9 @@ std::string network(const std::string& name, std::size_t depth, Activation activ
   return text + "    return x\n\n";
 }
 
-// Columns are joined by hstack, column_stack and dstack, never by cat or stack: the fuser of LibTorch
-// 2 with LLVM (Debian 13's) joins a cat with what comes before and after it, and then compiles for
-// minutes.
+// Columns are joined by hstack, column_stack and dstack, never by cat or stack: the fuser of
+// LibTorch 2 with LLVM (Debian 13's) joins a cat with what comes before and after it, and then
+// compiles for minutes.
 
 /// Checks of the arguments, and the latent as rows [1 or P, Z].
 const char* const kCommon = R"(
