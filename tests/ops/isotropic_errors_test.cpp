@@ -8,8 +8,7 @@
 
 #include "ops/plain_tensors.hpp"
 #include "ops/reference/isotropic_errors.hpp"
-#include "tests/support/isotropic_error_cases.hpp"
-#include "tests/support/tensors.hpp"
+#include "tests/support/isotropic_error_tensors.hpp"
 
 namespace uniphy::ops {
 namespace {
@@ -17,37 +16,7 @@ namespace {
 using testing::IsotropicErrorCase;
 using torch::Tensor;
 
-/// The inputs of the ops; those with a gradient are z, caps, caps_rest, moduli, moduli_rest.
-struct Inputs {
-  IsotropicBatch batch;
-  Tensor scales, seed;
-  std::vector<Tensor> leaves;
-  ErrorMeasure measure;
-
-  Inputs(const IsotropicErrorCase& c, torch::Dtype type) : measure{c.floor, c.delta} {
-    const auto tensor = [type](const std::vector<double>& v, std::vector<std::int64_t> sizes) {
-      return torch::tensor(v, torch::kFloat64).view(sizes).to(type);
-    };
-    const std::int64_t n = c.trajectories, m = c.samples;
-    batch = {tensor(c.columns, {c.table, kernels::IsotropicColumns::count}),
-             torch::tensor(c.rows, torch::kInt64).view({n, m})};
-    scales = tensor(c.scales, {n, 3});
-    leaves = {tensor(c.z, {n, c.latent}), tensor(c.caps, {n, c.state_caps ? m : 1, 4}),
-              tensor(c.caps_rest, {n, 1, 4}), tensor(c.moduli, {n, c.state_moduli ? m : 1, 8}),
-              tensor(c.moduli_rest, {n, 1, 8})};
-    for (Tensor& t : leaves) t.requires_grad_();
-    torch::manual_seed(3);
-    seed = torch::randn({n, kernels::kIsotropicLosses}, torch::kFloat64).to(type);
-  }
-  IsotropicErrors errors() const {
-    return isotropic_errors(batch, scales, leaves[0], {leaves[1], leaves[2], leaves[3], leaves[4]},
-                            measure);
-  }
-  std::vector<Tensor> gradients() const {
-    return torch::autograd::grad({(seed * errors().losses).sum()}, leaves, {}, c10::nullopt, false,
-                                 /*allow_unused=*/true);
-  }
-};
+using Inputs = testing::IsotropicErrorInputs;
 
 TEST(IsotropicErrors, ValuesAndGradientsMatchPlainTensors) {
   for (const auto& [type, tolerance] :
@@ -74,25 +43,8 @@ TEST(IsotropicErrors, ValuesAndGradientsMatchPlainTensors) {
 }
 
 TEST(IsotropicErrors, GradientsAgreeWithCentralDifferences) {
-  // The share weighs a missed cap as a constant, which differences do not know: only samples that
-  // the law cuts.
-  for (IsotropicErrorCase c : testing::isotropic_error_cases()) {
-    for (std::int64_t& row : c.rows) row = row % 3 == 0 ? row + 1 : row;
-    Inputs in(c, torch::kFloat64);
-    const std::vector<Tensor> got = in.gradients();
-    const torch::NoGradGuard guard;
-    for (std::size_t k = 0; k < got.size(); ++k) {
-      const Tensor keep = in.leaves[k];
-      const Tensor want = testing::numerical_gradient(
-          [&](const Tensor& at) {
-            in.leaves[k] = at;
-            return (in.seed * in.errors().losses).sum();
-          },
-          keep, 1e-5);
-      in.leaves[k] = keep;
-      EXPECT_LE(testing::relative_difference(got[k], want), 1e-6) << k;
-    }
-  }
+  for (const IsotropicErrorCase& c : testing::isotropic_error_cases())
+    for (const double error : testing::isotropic_gradient_errors(c)) EXPECT_LE(error, 1e-6);
 }
 
 TEST(IsotropicErrors, AnswersAtRestMayBeTheAnswersThemselves) {

@@ -1,4 +1,5 @@
 #include "tests/ops/gradient_table/rows.hpp"
+#include "tests/support/isotropic_error_tensors.hpp"
 #include "tests/support/learned_law_cases.hpp"
 #include "tests/support/mpm_op_cases.hpp"
 #include "tests/support/network_cases.hpp"
@@ -34,6 +35,12 @@ std::vector<GradientRow> op_rows() {
     add(op, "x", errors.x);
     add(op, "weights", errors.weights);
     add(op, "biases", errors.biases);
+  }
+  for (const bool state : {false, true}) {
+    const auto errors = isotropic_gradient_errors(isotropic_error_case(4, 37, state, state));
+    const char* const leaves[] = {"z", "caps", "caps at rest", "moduli", "moduli at rest"};
+    for (std::size_t k = 0; k < errors.size(); ++k)
+      add(state ? "training errors, state" : "training errors", leaves[k], errors[k]);
   }
   for (const RolloutMaterial& m : rollout_materials()) {
     const RolloutErrors errors = rollout_errors(m);

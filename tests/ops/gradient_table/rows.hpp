@@ -23,7 +23,8 @@ std::vector<GradientRow> law_rows(kernels::Isa isa);
 /// The learned law's op in both forms, with the same columns. Like all ops below it runs on
 /// kernels::active_isa().
 std::vector<GradientRow> learned_law_rows();
-/// P2G, grid update, G2P, the network and roll-outs of 50 steps: one number a row.
+/// P2G, grid update, G2P, the network, the errors that training minimises, and roll-outs of 50
+/// steps: one number a row.
 std::vector<GradientRow> op_rows();
 
 }  // namespace uniphy::testing
