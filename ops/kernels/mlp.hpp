@@ -111,15 +111,6 @@ UNIPHY_INLINE T plane_sum(const T* plane) {
   return lane_sum(sum);
 }
 
-/// The sum of the lanes in the order that is fastest on the instruction set.
-template <class V>
-UNIPHY_INLINE ScalarOf<V> quick_lane_sum(const V& v) {
-  if constexpr (is_scalar_lane<V>)
-    return v;
-  else
-    return xsimd::hadd(v);
-}
-
 /// Adds the gradients of one layer's weight and bias. Blocks of them stay in registers over a tile;
 /// rows of the last blocks beyond `out` and `in` are read but count for nothing.
 template <class T>
