@@ -50,6 +50,7 @@ class Measurer {
     ThreadSetting setting;
   };
   bool has_baseline(const std::string& name) const { return baselines_.count(name) > 0; }
+  /// The fastest setting, one of several threads only where that gains a tenth.
   Best baseline(const std::string& name) const;
   int threads() const { return threads_; }
 
