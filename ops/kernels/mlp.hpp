@@ -142,9 +142,9 @@ inline void tile_weight_gradient(int out, int in, const T* grad, const T* from,
 }
 
 /// grad_out [padded(out), kTile] → grad_in [padded(in), kTile] (may be null), given the tape of the
-/// same tile. Rows of grad_out beyond out() are not read. `first_bias`, if given, has the gradient
-/// of the first layer's bias added, [out of layer 0]. `weights`, if given, has one entry a layer;
-/// gradients of weights and biases are added to it.
+/// same tile. What rows of grad_out beyond out() hold does not matter. `first_bias`, if given, has
+/// the gradient of the first layer's bias added, [out of layer 0]. `weights`, if given, has one
+/// entry a layer; gradients of weights and biases are added to it.
 template <class T>
 inline void mlp_backward(const PackedMlp<T>& net, const T* in, T* tape, const T* grad_out,
                          T* grad_in, T* first_bias, const WeightGradient<T>* weights) {
