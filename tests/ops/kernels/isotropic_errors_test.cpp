@@ -81,6 +81,18 @@ std::vector<double> gradient(Isa isa, const IsotropicErrorCase& c) {
   return all;
 }
 
+/// The weighted means by central differences of the inputs.
+std::vector<double> differences(Isa isa, const IsotropicErrorCase& c) {
+  Trajectory<double> t(c);
+  const auto loss = [&](const std::vector<double>& x) {
+    double m[kIsotropicMeans], sum = 0;
+    isotropic_errors_table<double>(isa).errors(t.answers(x), m);
+    for (int k = 0; k < kIsotropicLosses; ++k) sum += kWeights[k] * m[k];
+    return sum;
+  };
+  return testing::central_differences(loss, t.inputs, std::vector<double>(t.inputs.size(), 1e-5));
+}
+
 class IsotropicErrorsOnIsa : public ::testing::TestWithParam<Isa> {};
 
 TEST_P(IsotropicErrorsOnIsa, ValuesAndGradientsAreThoseOfTheBaseline) {
@@ -95,19 +107,9 @@ TEST_P(IsotropicErrorsOnIsa, ValuesAndGradientsAreThoseOfTheBaseline) {
 }
 
 TEST_P(IsotropicErrorsOnIsa, GradientsAgreeWithCentralDifferences) {
-  const auto& table = isotropic_errors_table<double>(GetParam());
   for (const IsotropicErrorCase& c : testing::isotropic_error_cases()) {
-    Trajectory<double> t(c);
-    const auto loss = [&](const std::vector<double>& x) {
-      double m[kIsotropicMeans], sum = 0;
-      table.errors(t.answers(x), m);
-      for (int k = 0; k < kIsotropicLosses; ++k) sum += kWeights[k] * m[k];
-      return sum;
-    };
     // The share weighs a missed cap as a constant, which differences do not know.
-    const auto differences =
-        testing::central_differences(loss, t.inputs, std::vector<double>(t.inputs.size(), 1e-5));
-    auto got = gradient<double>(GetParam(), c), want = differences;
+    auto got = gradient<double>(GetParam(), c), want = differences(GetParam(), c);
     for (std::int64_t k = 0; k < (c.state_caps ? c.samples : 1); ++k)
       got[std::size_t(4 + 4 * k + 3)] = want[std::size_t(4 + 4 * k + 3)] = 0;
     EXPECT_LE(testing::relative_error(got, want), 1e-6)
@@ -116,22 +118,11 @@ TEST_P(IsotropicErrorsOnIsa, GradientsAgreeWithCentralDifferences) {
 }
 
 TEST_P(IsotropicErrorsOnIsa, TheShareHasItsGradientWhereTheLawCuts) {
-  const auto& table = isotropic_errors_table<double>(GetParam());
   for (IsotropicErrorCase c : testing::isotropic_error_cases()) {
-    // η̃ alone, on samples of the two kinds that the law cuts.
+    // All of the gradient, on samples of the two kinds that the law cuts.
     for (std::int64_t& row : c.rows) row = row % 3 == 0 ? row + 1 : row;
-    Trajectory<double> t(c);
-    const auto loss = [&](const std::vector<double>& x) {
-      double m[kIsotropicMeans], sum = 0;
-      table.errors(t.answers(x), m);
-      for (int k = 0; k < kIsotropicLosses; ++k) sum += kWeights[k] * m[k];
-      return sum;
-    };
-    EXPECT_LE(
-        testing::relative_error(gradient<double>(GetParam(), c),
-                                testing::central_differences(
-                                    loss, t.inputs, std::vector<double>(t.inputs.size(), 1e-5))),
-        1e-6)
+    EXPECT_LE(testing::relative_error(gradient<double>(GetParam(), c), differences(GetParam(), c)),
+              1e-6)
         << c.samples << " samples, " << c.state_caps << c.state_moduli;
   }
 }
