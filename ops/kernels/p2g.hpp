@@ -85,6 +85,12 @@ void p2g_records(const T* state, const T* tau, const T* mass, const T* volume,
   }
 }
 
+/// Asks for the record of the same lane in the next chunk (prefetch.hpp), which need not exist.
+template <class T>
+UNIPHY_INLINE void prefetch_record_after(const T* record) {
+  __builtin_prefetch(reinterpret_cast<const char*>(record) + sizeof(TransferChunk<T>));
+}
+
 /// Adds the chunk to the layers [layer_begin, layer_end) of the grid.
 template <class T>
 void scatter(const TransferChunk<T>& chunk, const GridView<T>& grid, int layer_begin,
@@ -103,6 +109,7 @@ void scatter(const TransferChunk<T>& chunk, const GridView<T>& grid, int layer_b
     weights3(chunk.f[1][l], wy);
     const Row wz = row_weights(chunk.f[2][l]);
     const T* record = chunk.record[l];
+    prefetch_record_after(record);
     const Row q = fma(index, Row::repeat4(record + 12), Row::repeat4(record)) * wz;
     const Row ax = Row::repeat4(record + 4) * wz;
     const Row ay = Row::repeat4(record + 8) * wz;

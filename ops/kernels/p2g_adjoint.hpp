@@ -24,6 +24,7 @@ void gather_adjoint(const TransferChunk<T>& chunk, const GridView<const T>& grid
     weight_slopes3(chunk.f[1][l], dy);
     const Row wz = row_weights(chunk.f[2][l]);
     const T* record = chunk.record[l];
+    if (slopes_only) prefetch_record_after(record);
     const Row q = fma(index, Row::repeat4(record + 12), Row::repeat4(record));
     const Row ax = Row::repeat4(record + 4), ay = Row::repeat4(record + 8);
     const T* layer = node_at(grid, chunk.base[0][l], chunk.base[1][l], chunk.base[2][l]);

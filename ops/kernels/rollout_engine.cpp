@@ -83,11 +83,14 @@ void RolloutEngine<T>::begin_step(int chunk, std::ptrdiff_t s) {
       keep_F_trial_ ? F_trials_.data() + chunk * std::ptrdiff_t(kMatrixChunkSize) : scratch_F;
   T* tau = keep_history_ || keep_F_trial_ ? stress(s, chunk) : scratch_tau;
   const int count = order_.count(chunk);
+  const int next = after(chunk);
   table_.deformation_update(from, count, constants_, F_trial);
+  prefetch(state(s, next) + kPlaneF * kChunk, kMatrixChunkSize * sizeof(T));
   rollout_.bodies()[order_.body(chunk)].law->evaluate(
       count, constants_.dt, plane_view<const T>(F_trial),
       plane_view<const T>(from + kPlaneC * kChunk), plane_view(to + kPlaneF * kChunk),
       plane_view(tau));
+  prefetch(transfer_[next].record, sizeof(transfer_[next].record));
   table_.p2g_records(from, tau, mass(chunk), volume(chunk), constants_, &transfer_[chunk]);
 }
 
@@ -97,7 +100,10 @@ void RolloutEngine<T>::transfer_layers(std::ptrdiff_t s, int part, int parts) {
   if (begin >= end) return;
   const GridView<T> grid = grid_view(grid_nodes_.data(), constants_.n);
   for (int i = begin; i < end; ++i) clear_layer(grid, i, plan_.box(i));
-  for (int c = 0; c < chunks(); ++c) table_.scatter(transfer_[c], grid, begin, end);
+  for (int c = 0; c < chunks(); ++c) {
+    if (c + 1 < chunks()) prefetch_stencil(transfer_[c + 1]);
+    table_.scatter(transfer_[c], grid, begin, end);
+  }
   for (int i = begin; i < end; ++i) {
     table_.grid_update(grid, i, plan_.box(i), constants_);
     if (keep_history_) {
@@ -109,14 +115,13 @@ void RolloutEngine<T>::transfer_layers(std::ptrdiff_t s, int part, int parts) {
 template <class T>
 void RolloutEngine<T>::end_step(int chunk, std::ptrdiff_t s) {
   alignas(64) T moments[kGatherPlanes * kChunk];
-  if (chunk + 1 < chunks()) {
-    prefetch(state(s, chunk + 1), kStateChunkSize * sizeof(T));
-    prefetch(&transfer_[chunk + 1], sizeof(TransferChunk<T>));
-  }
+  const int next = after(chunk);
   TransferChunk<T>& transfer = transfer_[chunk];
   const T* from = state(s, chunk);
   T* to = state(s + 1, chunk);
+  prefetch_stencil(transfer_[next]);
   table_.gather(transfer, grid_view<const T>(grid_nodes_.data(), constants_.n), moments);
+  prefetch(state(s, next), kPlaneF * kChunk * sizeof(T));
   table_.g2p_finish(transfer, moments, from, constants_, to);
   table_.stencil(to, order_.count(chunk), constants_, &transfer);
 }

@@ -3,6 +3,7 @@
 // Inside of rollout.cpp and rollout_adjoint.cpp: the particles of a roll-out in chunks, and the
 // loops over steps.
 
+#include <algorithm>
 #include <vector>
 
 #include "ops/kernels/aligned_buffer.hpp"
@@ -60,6 +61,8 @@ class RolloutEngine {
   T* mass(int chunk) { return mass_.data() + chunk * std::ptrdiff_t(kChunk); }
   T* volume(int chunk) { return volume_.data() + chunk * std::ptrdiff_t(kChunk); }
   int chunks() const { return order_.chunks(); }
+  /// The chunk to prefetch while at work on `chunk`.
+  int after(int chunk) const { return std::min(chunk + 1, chunks() - 1); }
   /// Calls visit(chunk) for the share of thread `part` of `parts`: an equal part of every body,
   /// since laws differ in cost.
   template <class Visit>
@@ -70,7 +73,6 @@ class RolloutEngine {
   void begin_step(int chunk, std::ptrdiff_t s);
   void transfer_layers(std::ptrdiff_t s, int part, int parts);
   void end_step(int chunk, std::ptrdiff_t s);
-  void prefetch_backward_step(int chunk, std::ptrdiff_t s);
   void begin_backward_step(int chunk, std::ptrdiff_t s);
   void transfer_layers_backward(std::ptrdiff_t s, int part, int parts);
   void end_backward_step(int chunk, std::ptrdiff_t s);

@@ -31,25 +31,15 @@ void RolloutEngine<T>::transfer_layers_backward(std::ptrdiff_t s, int part, int 
   const GridView<T> grid = grid_view(grid_nodes_.data(), constants_.n);
   const GridView<T> grad = grid_view(grad_nodes_.data(), constants_.n);
   for (int i = begin; i < end; ++i) clear_layer(grad, i, plan.box(i));
-  for (int c = 0; c < chunks(); ++c) table_.scatter(transfer_[c], grad, begin, end);
+  for (int c = 0; c < chunks(); ++c) {
+    if (c + 1 < chunks()) prefetch_stencil(transfer_[c + 1]);
+    table_.scatter(transfer_[c], grad, begin, end);
+  }
   for (int i = begin; i < end; ++i) {
     restore_layer(grid, i, plan.box(i), record.nodes.data() + 4 * plan.offset(i));
     table_.grid_update_adjoint({grid.data, grid.row_stride, grid.layer_stride}, grad, i,
                                plan.box(i), constants_);
   }
-}
-
-/// What end_backward_step(chunk, s) and begin_backward_step(chunk, s − 1) will touch.
-template <class T>
-void RolloutEngine<T>::prefetch_backward_step(int chunk, std::ptrdiff_t s) {
-  if (chunk >= chunks()) return;
-  constexpr std::size_t kVectorBytes = 3 * kChunk * sizeof(T);
-  prefetch(&transfer_[chunk], sizeof(TransferChunk<T>));
-  prefetch(grads_.data() + chunk * std::ptrdiff_t(kStateChunkSize), kStateChunkSize * sizeof(T));
-  prefetch(state(s + 1, chunk) + kPlaneV * kChunk, kVectorBytes);
-  prefetch(state(s, chunk), kStateChunkSize * sizeof(T));
-  prefetch(stress(s, chunk), kMatrixChunkSize * sizeof(T));
-  if (s > 0) prefetch(state(s - 1, chunk) + kPlaneX * kChunk, kVectorBytes);
 }
 
 template <class T>
@@ -62,16 +52,22 @@ void RolloutEngine<T>::end_backward_step(int chunk, std::ptrdiff_t s) {
   T* grad = grads_.data() + chunk * std::ptrdiff_t(kStateChunkSize);
   const GridView<const T> grid = grid_view<const T>(grid_nodes_.data(), constants_.n);
   const GridView<const T> grad_grid = grid_view<const T>(grad_nodes_.data(), constants_.n);
-  prefetch_backward_step(chunk + 1, s);
+  const int next = after(chunk);
 
+  prefetch_stencil(transfer_[next]);
+  prefetch(state(s + 1, next) + kPlaneV * kChunk, 3 * kChunk * sizeof(T));
   table_.gather_slopes(transfer, grid, moments);
+  prefetch(grads_.data() + next * std::ptrdiff_t(kStateChunkSize), kStateChunkSize * sizeof(T));
   table_.g2p_adjoint_finish(transfer, moments, state(s + 1, chunk) + kPlaneV * kChunk, constants_,
                             grad);
   table_.p2g_records(from, stress(s, chunk), mass(chunk), volume(chunk), constants_, &transfer);
+  prefetch(state(s, next), kStateChunkSize * sizeof(T));
   table_.gather_adjoint(transfer, grad_grid, moments);
+  prefetch(stress(s, next), kMatrixChunkSize * sizeof(T));
   table_.p2g_adjoint_finish(transfer, moments, mass(chunk), volume(chunk), constants_, grad,
                             grad_tau);
 
+  if (s > 0) prefetch(state(s - 1, next) + kPlaneX * kChunk, 3 * kChunk * sizeof(T));
   table_.deformation_update(from, count, constants_, F_trial);
   T* grad_F = grad + kPlaneF * kChunk;
   T* grad_C = grad + kPlaneC * kChunk;

@@ -83,8 +83,9 @@ void bench_size(const BenchOptions& options, std::int64_t particles, int threads
   const kernels::Rollout<float> rollout(
       body.grid, {{0, particles, std::make_shared<FreeLaw<float>>()}}, body.mass, body.volume);
   const std::ptrdiff_t steps = options.mpm_steps;
-  // Some 160 bytes a kept particle-step: half a gigabyte at most.
-  const std::ptrdiff_t kept = std::clamp<std::ptrdiff_t>(3200000 / particles, 2, steps);
+  // As many steps as a segment of a roll-out keeps, within two gigabytes: some 160 bytes a
+  // particle-step.
+  const std::ptrdiff_t kept = std::clamp<std::ptrdiff_t>(12800000 / particles, 2, steps);
 
   Measurer measurer(threads);
   // What a long roll-out does again and again: sort, walk the steps, hand the state over.
@@ -106,8 +107,9 @@ void bench_size(const BenchOptions& options, std::int64_t particles, int threads
   for (auto* numbers : {&seed.x, &seed.v, &seed.C, &seed.F}) {
     for (float& number : *numbers) number = 1e-3F * normal(random);
   }
+  ParticleState<float> grad = seed;
   measurer.add("backward", [&] {
-    ParticleState<float> grad = seed;
+    grad = seed;
     engine.backward(grad, 0, {});
   });
   std::vector<Tensor> keep;
