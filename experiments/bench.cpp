@@ -1,5 +1,6 @@
 #include "uniphy/bench/bench.hpp"
 
+#include <malloc.h>
 #include <unistd.h>
 
 #include <cstdlib>
@@ -11,6 +12,10 @@ int main(int argc, char** argv) {
     ::unsetenv("OPENBLAS_CORETYPE");
     ::execv("/proc/self/exe", argv);  // returns only where that is not possible
   }
+  // Freed tensors stay with the process. Else most of what some calls take, ours and the
+  // plain-tensor versions' alike, is the kernel clearing pages.
+  ::mallopt(M_MMAP_THRESHOLD, 32 << 20);
+  ::mallopt(M_TRIM_THRESHOLD, 1 << 30);
   return uniphy::run_experiment(argc, argv, uniphy::bench::bench_info(),
                                 uniphy::bench::declare_bench);
 }

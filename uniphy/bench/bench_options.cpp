@@ -21,7 +21,7 @@ BenchOptions read_bench_options(Section& config) {
                      "times that everything is measured; the shortest time counts"));
   o.effort.seconds = config.real("seconds", 0.003, between(1e-6, 100), "s",
                                  "least duration of one measurement in a round");
-  o.effort.budget = config.real("budget", 1.5, between(0, 1e6), "s",
+  o.effort.budget = config.real("budget", 4, between(0, 1e6), "s",
                                 "work that took so long already sits out the later rounds");
   Section machine = config.section("machine", "the limits of this machine");
   o.copy_mb = machine.integer("copy_mb", 256, between(1, 65536), "MiB",

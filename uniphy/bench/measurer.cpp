@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <chrono>
 #include <limits>
+#include <thread>
 
 #include "ops/kernels/error.hpp"
 #include "uniphy/report/interrupt.hpp"
@@ -50,6 +51,10 @@ void apply(const ThreadSetting& setting) {
   // time, which spin for some 20 ms and take a processor from what is measured.
   omp_set_num_threads(setting.threads);
   if (auto* set = openblas<void(int)>("openblas_set_num_threads")) set(setting.blas_threads);
+  // The threads of OpenBLAS wait awake for some 26 ms; what comes next shall not share with them.
+  static bool blas_awake = false;
+  if (blas_awake) std::this_thread::sleep_for(std::chrono::milliseconds(40));
+  blas_awake = setting.blas_threads > 1;
 }
 
 std::string blas_core_type() {

@@ -23,7 +23,7 @@ std::string blas_core_type();
 struct Effort {
   int rounds = 30;
   double seconds = 0.003;
-  double budget = 1.5;
+  double budget = 4;
 };
 
 /// Times work with Google Benchmark. The rounds walk over everything that is registered, so that a
