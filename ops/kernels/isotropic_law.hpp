@@ -38,7 +38,7 @@ inline namespace UNIPHY_ISA {
 /// Scratch numbers of isotropic_evaluate and isotropic_adjoint for one tile.
 template <class T>
 std::ptrdiff_t isotropic_scratch(const LearnedLaw<T>& law) {
-  return law.projection.tape_scratch() + law.stress.tape_scratch() + kTile * 72;
+  return law.projection.tape_scratch() + law.stress.tape_scratch() + kTile * 79;
 }
 
 /// The forward tile: spectral factors and gate inputs are left in `tile` for the adjoint.
@@ -46,7 +46,7 @@ template <class T>
 struct IsotropicTile {
   T *projection_in, *stress_in, *projection_tape, *stress_tape;
   T *U, *sigma, *V, *grad_projection, *grad_invariants, *grad_direct, *grad_stress;
-  T *grad_features, *frame;
+  T *grad_features, *frame, *strain;
   explicit IsotropicTile(const LearnedLaw<T>& law, T* scratch) {
     T* at = scratch;
     const auto take = [&at](std::ptrdiff_t n) {
@@ -65,6 +65,7 @@ struct IsotropicTile {
     grad_stress = take(8 * kTile);
     grad_features = take(8 * kTile);
     frame = take(9 * kTile);
+    strain = take(7 * kTile);
     projection_tape = take(law.projection.tape_scratch());
     stress_tape = take(law.stress.tape_scratch());
   }
@@ -88,11 +89,12 @@ const T* network(const PackedMlp<T>& net, const T* constant, const T* in, T* tap
   return keep ? mlp_forward_tape(net, in, tape) : mlp_forward(net, in, tape);
 }
 
-/// One tile of `count` ≤ kTile particles. `keep` fills what isotropic_adjoint reads. Returns the
-/// two networks' outputs through `h` and `a`.
+/// One tile of `count` ≤ kTile particles. `keep` fills what isotropic_adjoint reads; else F_proj is
+/// written, if given, and what isotropic_evaluate needs of the projected strain. Returns the two
+/// networks' outputs through `h` and `a`.
 template <bool keep, class T>
 inline void isotropic_tile_forward(const LearnedLaw<T>& law, std::ptrdiff_t count,
-                                   View<const T> F_trial, View<const T> C,
+                                   View<const T> F_trial, View<const T> C, View<T> F_proj,
                                    const IsotropicTile<T>& tile, const T*& h, const T*& a) {
   using V = Lanes<T>;
   using namespace isotropic_detail;
@@ -125,6 +127,15 @@ inline void isotropic_tile_forward(const LearnedLaw<T>& law, std::ptrdiff_t coun
     store_plane(tile.stress_in + 3 * kTile, l, s.rate_trace);
     store_plane(tile.stress_in + 4 * kTile, l, s.rate_norm);
     store_plane(tile.stress_in + 5 * kTile, l, s.x);
+    if constexpr (!keep) {
+      for (int k = 0; k < 3; ++k) store_plane(tile.strain + k * kTile, l, s.h.eps[k]);
+      for (int k = 0; k < 3; ++k) store_plane(tile.strain + (3 + k) * kTile, l, s.second[k]);
+      store_plane(tile.strain + 6 * kTile, l, s.h.trace);
+      if (F_proj && l < count) {
+        const Mat3<V> F = load_mat3<V, T>(F_trial, l, count - l, true);
+        store_mat3<V, T>(F_proj, l, count - l, projected_F(g, U, load_plane3<V>(tile.V, l), F));
+      }
+    }
   }
   a = network<keep>(law.stress, law.constant_stress, tile.stress_in, tile.stress_tape);
 }
@@ -138,21 +149,17 @@ inline void isotropic_evaluate(const LearnedLaw<T>& law, std::ptrdiff_t count,
   using namespace isotropic_detail;
   const IsotropicTile<T> tile(law, scratch);
   const T *h, *a;
-  isotropic_tile_forward<false>(law, count, F_trial, C, tile, h, a);
-  const T e = law.strain_scale;
+  isotropic_tile_forward<false>(law, count, F_trial, C, F_proj, tile, h, a);
+  if (!tau) return;
   for (std::ptrdiff_t l = 0; l < count; l += width_of<V>) {
-    const Mat3<V> F = load_mat3<V, T>(F_trial, l, count - l, true);
-    Vec3<V> sigma;
-    for (int k = 0; k < 3; ++k) sigma[k] = V::load_aligned(tile.sigma + k * kTile + l);
-    const Mat3<V> U = load_plane3<V>(tile.U, l), Vm = load_plane3<V>(tile.V, l);
-    const Gate<V> g = gate<V, T>(law, hencky_strain(sigma, false), h + l, tile.projection_in + l);
-    const StressState<V> s = stress_state<V, T>(U, projected_sigma<V, T>(g, sigma),
-                                                load_mat3<V, T>(C, l, count - l, false), e, false);
-    if (F_proj) store_mat3<V, T>(F_proj, l, count - l, projected_F(g, U, Vm, F));
-    if (tau)
-      store_mat3<V, T>(
-          tau, l, count - l,
-          basis_stress(s, U, coefficients<V>(law, a + l), V(T(1) / e)) * V(law.stress_scale));
+    StressState<V> s;
+    for (int k = 0; k < 3; ++k) s.h.eps[k] = V::load_aligned(tile.strain + k * kTile + l);
+    for (int k = 0; k < 3; ++k) s.second[k] = V::load_aligned(tile.strain + (3 + k) * kTile + l);
+    s.h.trace = V::load_aligned(tile.strain + 6 * kTile + l);
+    set_rate(load_mat3<V, T>(C, l, count - l, false), s);
+    const Mat3<V> in_s = basis_stress(s, load_plane3<V>(tile.U, l), coefficients<V>(law, a + l),
+                                      V(T(1) / law.strain_scale));
+    store_mat3<V, T>(tau, l, count - l, in_s * V(law.stress_scale));
   }
 }
 

@@ -36,7 +36,7 @@ inline void isotropic_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, Vi
   constexpr int w = width_of<V>;
   const IsotropicTile<T> tile(law, scratch);
   const T *h, *a;
-  isotropic_tile_forward<true>(law, count, F_trial, C, tile, h, a);
+  isotropic_tile_forward<true>(law, count, F_trial, C, {}, tile, h, a);
   const T e = law.strain_scale;
   const V zero(T(0)), one(T(1)), two(T(2)), third(T(1.0 / 3)), inv_e(T(1) / e);
   const V scale(law.stress_scale);

@@ -54,15 +54,22 @@ UNIPHY_INLINE StressState<V> stress_state(const HenckyStrain<V>& h, const Mat3<V
   for (int i = 0; i < 3; ++i) s.second[i] = (w2[i] - mean) * s.spread;
   return s;
 }
+/// rate and rate_trace.
+template <class V>
+UNIPHY_INLINE void set_rate(const Mat3<V>& C, StressState<V>& s) {
+  using T = ScalarOf<V>;
+  s.rate = sym(C) * V(T(kTimeScale));
+  s.rate_trace = trace(s.rate);
+  const V mean = s.rate_trace * V(T(1.0 / 3));
+  for (int k = 0; k < 9; k += 4) s.rate.e[k] = s.rate.e[k] - mean;
+}
 template <class V, class T>
 UNIPHY_INLINE StressState<V> stress_state(const Mat3<V>& U, const Vec3<V>& sigma, const Mat3<V>& C,
                                           T strain_scale, bool gradients) {
-  const V third(T(1.0 / 3));
-  Mat3<V> rate = sym(C) * V(T(kTimeScale));
-  const V rate_trace = trace(rate);
-  for (int k = 0; k < 9; k += 4) rate.e[k] = rate.e[k] - rate_trace * third;
-  return stress_state(hencky_strain(sigma, gradients), rate, rate_trace, tmul(U, mul(rate, U)),
-                      V(T(1) / strain_scale));
+  StressState<V> of;
+  set_rate(C, of);
+  return stress_state(hencky_strain(sigma, gradients), of.rate, of.rate_trace,
+                      tmul(U, mul(of.rate, U)), V(T(1) / strain_scale));
 }
 
 /// An exponent: a network's output, bounded, and whether it is within the bound.
