@@ -92,6 +92,44 @@ torch::Tensor forward(const MlpProblem<T>& problem, const torch::Tensor& feature
   return y;
 }
 
+/// Running sums of the gradients of all weights and biases, but for the part of the first weight
+/// that takes z: how they lie in memory.
+template <class T>
+class WeightSums {
+ public:
+  explicit WeightSums(const kernels::PackedMlp<T>& net) : net_(net) {
+    for (int k = 0; k < net.depth; ++k) size_ += weights_of(k) + biases_of(k);
+  }
+  std::int64_t size() const { return size_; }
+  std::vector<kernels::WeightGradient<T>> in(T* at) const {
+    std::vector<kernels::WeightGradient<T>> layers;
+    for (int k = 0; k < net_.depth; ++k) {
+      layers.push_back({at, at + weights_of(k)});
+      at += weights_of(k) + biases_of(k);
+    }
+    return layers;
+  }
+  /// Adds a sum to the flat weights; those of the first layer have `latent` columns more.
+  void add(const std::vector<kernels::WeightGradient<T>>& sum, std::int64_t latent, T* to) const {
+    for (int k = 0; k < net_.depth; ++k, latent = 0) {
+      const std::int64_t n_in = net_.layer[k].in, n_out = net_.layer[k].out;
+      for (std::int64_t o = 0; o < n_out; ++o, to += n_in + latent)
+        for (std::int64_t i = 0; i < n_in; ++i)
+          to[i] += sum[k].weight[o * kernels::weight_stride(net_.layer[k].in) + i];
+      for (std::int64_t o = 0; o < n_out; ++o) *to++ += sum[k].bias[o];
+    }
+  }
+
+ private:
+  std::int64_t weights_of(int k) const {
+    return kernels::padded(net_.layer[k].out) * kernels::weight_stride(net_.layer[k].in);
+  }
+  std::int64_t biases_of(int k) const { return kernels::weight_stride(net_.layer[k].out); }
+
+  const kernels::PackedMlp<T>& net_;
+  std::int64_t size_ = 0;
+};
+
 /// Gradients of the features, z and the flat weights, each where it is wanted.
 template <class T>
 variable_list backward(const MlpProblem<T>& problem, const torch::Tensor& features,
@@ -103,11 +141,11 @@ variable_list backward(const MlpProblem<T>& problem, const torch::Tensor& featur
   const std::int64_t latent = problem.latent, n_in = net.in();
   const std::int64_t plane = std::int64_t(net.max_width) * kTile;
   const std::int64_t sums = want_weights ? std::min(kSums, tiles) : kSums;
-  // Without the part of the first weight that takes z.
-  const std::int64_t per_sum = flat.numel() - width * latent;
+  const WeightSums<T> layout(net);
   torch::Tensor grad_features, grad_z, grad_flat;
   if (want_features) grad_features = torch::empty_like(features);
-  std::vector<T> partial(want_weights ? std::size_t(sums * per_sum) : 0, T(0));
+  kernels::AlignedBuffer<T> partial(want_weights ? sums * layout.size() : 0);
+  partial.fill(T(0));
   const bool want_bias = latent > 0 && (want_z || want_weights);
   std::vector<T> first_bias(want_bias ? std::size_t(tiles * width) : 0, T(0));
   const T *from = features.data_ptr<T>(), *codes = z.data_ptr<T>(), *grad_from = grad.data_ptr<T>();
@@ -115,25 +153,19 @@ variable_list backward(const MlpProblem<T>& problem, const torch::Tensor& featur
 #pragma omp parallel
   {
     FoldedMlp<T> folded(problem);
-    kernels::AlignedBuffer<T> scratch(4 * plane + net.tape_scratch());
-    T *in = scratch.data(), *out = in + plane, *grad_out = out + plane, *grad_in = grad_out + plane,
+    kernels::AlignedBuffer<T> scratch(3 * plane + net.tape_scratch());
+    T *in = scratch.data(), *grad_out = in + plane, *grad_in = grad_out + plane,
       *tape = grad_in + plane;
-    std::vector<kernels::WeightGradient<T>> weights(net.depth);
+    std::vector<kernels::WeightGradient<T>> weights;
 #pragma omp for schedule(static)
     for (std::int64_t sum = 0; sum < sums; ++sum) {
-      T* at = partial.data() + (want_weights ? sum * per_sum : 0);
-      for (int k = 0; want_weights && k < net.depth; ++k) {
-        weights[k].weight = at;
-        at += std::int64_t(net.layer[k].in) * net.layer[k].out;
-        weights[k].bias = at;
-        at += net.layer[k].out;
-      }
+      if (want_weights) weights = layout.in(partial.data() + sum * layout.size());
       for (std::int64_t t = sum * tiles / sums; t < (sum + 1) * tiles / sums; ++t) {
         const std::int64_t first = problem.first(t), count = problem.count(t);
         const auto& of_code = folded.of_code(codes + problem.code(t) * latent);
         to_planes(from + first * n_in, count, n_in, in);
         to_planes(grad_from + first * net.out(), count, net.out(), grad_out);
-        table.mlp_forward(of_code, in, out, tape);
+        table.mlp_tape(of_code, in, tape);
         table.mlp_backward(of_code, in, tape, grad_out, want_features ? grad_in : nullptr,
                            want_bias ? first_bias.data() + t * width : nullptr,
                            want_weights ? weights.data() : nullptr);
@@ -165,12 +197,8 @@ variable_list backward(const MlpProblem<T>& problem, const torch::Tensor& featur
       for (std::int64_t o = 0; o < width; ++o)
         for (std::int64_t k = 0; k < latent; ++k)
           to[o * problem.in() + n_in + k] += bias_of(i)[o] * codes[i * latent + k];
-    for (std::int64_t sum = 0; sum < sums; ++sum) {
-      const T* part = partial.data() + sum * per_sum;
-      for (std::int64_t o = 0; o < width; ++o)
-        for (std::int64_t k = 0; k < n_in; ++k) to[o * problem.in() + k] += part[o * n_in + k];
-      for (std::int64_t i = width * n_in; i < per_sum; ++i) to[i + width * latent] += part[i];
-    }
+    for (std::int64_t sum = 0; sum < sums; ++sum)
+      layout.add(layout.in(partial.data() + sum * layout.size()), latent, to);
   }
   return {grad_features, grad_z, grad_flat};
 }

@@ -9,33 +9,35 @@
 namespace uniphy::kernels {
 inline namespace UNIPHY_ISA {
 
-/// e^x for |x| ≤ 80 to 1.5 units in the last place (float; others: lane_exp). 2^r on [−1/2, 1/2] is
-/// the polynomial of least largest relative error, 2e-9.
+/// c^x, given log₂ c: 2^(n + r), n an integer, with the polynomial in r of least largest relative
+/// error, 9e-8, on [−½, ½]. For |x log₂ c| ≤ 120; n takes part of x's own rounding to the result,
+/// as any exponential does.
+template <class V>
+UNIPHY_INLINE V bounded_power(const V& x, const V& log2_of_base) {
+  const V n = xsimd::nearbyint(x * log2_of_base);
+  const V r = fma(x, log2_of_base, -n);
+  V p(1.32647256236e-3F);
+  p = fma(p, r, V(9.67151309290e-3F));
+  p = fma(p, r, V(5.55073375169e-2F));
+  p = fma(p, r, V(0.240222420776F));
+  p = fma(p, r, V(0.693146977592F));
+  p = fma(p, r, V(1.0F));
+  return xsimd::ldexp(p, xsimd::to_int(n));
+}
+/// e^x for |x| ≤ 80.
 template <class V>
 UNIPHY_INLINE V bounded_exp(const V& x) {
-  using T = ScalarOf<V>;
-  if constexpr (is_scalar_lane<V> || sizeof(T) != sizeof(float)) {
+  if constexpr (is_scalar_lane<V> || sizeof(ScalarOf<V>) != sizeof(float)) {
     return lane_exp(x);
   } else {
-    // x/log 2 = n + r, 1/log 2 in two parts so that r keeps its last bits.
-    const V n = xsimd::nearbyint(x * V(1.44269502F));
-    const V r = fma(x, V(1.92596303e-8F), fma(x, V(1.44269502F), -n));
-    V p(1.53458273815e-4F);
-    p = fma(p, r, V(1.33999307896e-3F));
-    p = fma(p, r, V(9.61848889795e-3F));
-    p = fma(p, r, V(5.55032877851e-2F));
-    p = fma(p, r, V(2.40226468912e-1F));
-    p = fma(p, r, V(6.93147205736e-1F));
-    p = fma(p, r, V(1.0F));
-    return xsimd::ldexp(p, xsimd::to_int(n));
+    return bounded_power(x, V(1.44269504F));
   }
 }
 
 /// gelu of float lanes to 2e-7 of max(1, |x|), its slope to 2e-7: cheaper than by an erf, and
 /// without its branches.
 ///   Φ(x) − ½ = x P(x²)/Q(x²) of least largest error on [−6, 6], 2e-8; ±½ to rounding beyond
-///   slope    = Φ(x) + x φ(x), where exp(−x²/2) = 2^(n + r) takes a polynomial of least largest
-///              relative error in r, 9e-8
+///   slope    = Φ(x) + x φ(x)
 template <class V>
 UNIPHY_INLINE V gelu_lanes(const V& x, V* slope) {
   const V within = lane_max(V(-6.0F), lane_min(V(6.0F), x)), square = within * within;
@@ -52,15 +54,7 @@ UNIPHY_INLINE V gelu_lanes(const V& x, V* slope) {
   q = fma(q, square, V(1.0F));
   const V phi = fma(within, p / q, V(0.5F));
   if (slope) {
-    const V n = xsimd::nearbyint(square * V(-0.72134752F));
-    const V r = fma(square, V(-0.72134752F), -n);
-    V e(1.32647256236e-3F);
-    e = fma(e, r, V(9.67151309290e-3F));
-    e = fma(e, r, V(5.55073375169e-2F));
-    e = fma(e, r, V(0.240222420776F));
-    e = fma(e, r, V(0.693146977592F));
-    e = fma(e, r, V(1.0F));
-    const V density = xsimd::ldexp(e * V(0.39894228F), xsimd::to_int(n));
+    const V density = V(0.39894228F) * bounded_power(square, V(-0.72134752F));
     *slope = fma(within, density, phi);
   }
   return x * phi;

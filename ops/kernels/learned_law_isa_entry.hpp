@@ -38,6 +38,10 @@ void table_mlp_forward(const PackedMlp<T>& net, const T* in, T* out, T* scratch)
   for (std::ptrdiff_t k = 0; k < padded(net.out()) * kTile; ++k) out[k] = result[k];
 }
 template <class T>
+void table_mlp_tape(const PackedMlp<T>& net, const T* in, T* tape) {
+  mlp_forward_tape(net, in, tape, true);
+}
+template <class T>
 void table_mlp_backward(const PackedMlp<T>& net, const T* in, T* tape, const T* grad_out,
                         T* grad_in, T* first_bias, const WeightGradient<T>* weights) {
   mlp_backward(net, in, tape, grad_out, grad_in, first_bias, weights);
@@ -47,7 +51,7 @@ template <class T>
 const LearnedLawTable<T>& learned_law_isa_table() {
   static constexpr LearnedLawTable<T> kTable{learned_scratch<T>, learned_evaluate<T>,
                                              learned_adjoint<T>, table_mlp_forward<T>,
-                                             table_mlp_backward<T>};
+                                             table_mlp_tape<T>,  table_mlp_backward<T>};
   return kTable;
 }
 

@@ -30,11 +30,11 @@ struct LearnedLaw {
   std::ptrdiff_t accumulator_size() const { return coefficient_sums() + stress.out(); }
 };
 
-/// Where the weight gradients of one layer are added: [out, in] and [out].
+/// Where the gradients of one layer are added, aligned to 64 bytes.
 template <class T>
 struct WeightGradient {
-  T* weight;
-  T* bias;
+  T* weight;  ///< [padded(out), weight_stride(in)]
+  T* bias;    ///< [out]
 };
 
 /// The learned law's inner loops on one instruction set.
@@ -52,7 +52,9 @@ struct LearnedLawTable {
   /// A bare network on one tile of planes: in [padded(in), kTile] → out [padded(out), kTile].
   /// scratch: tape_scratch() numbers, which then hold the tape.
   void (*mlp_forward)(const PackedMlp<T>&, const T* in, T* out, T* scratch);
-  /// The adjoint of the mlp_forward that filled `tape`; grad_in, first_bias, weights may be null.
+  /// mlp_forward as far as mlp_backward needs it: the tape alone.
+  void (*mlp_tape)(const PackedMlp<T>&, const T* in, T* tape);
+  /// The adjoint of the mlp_forward or mlp_tape that filled `tape`; grad_in, first_bias, weights may be null.
   void (*mlp_backward)(const PackedMlp<T>&, const T* in, T* tape, const T* grad_out, T* grad_in,
                        T* first_bias, const WeightGradient<T>* weights);
 };

@@ -1,7 +1,10 @@
 #pragma once
 
+#include <type_traits>
+
 #include "ops/kernels/activation.hpp"
 #include "ops/kernels/learned_law_table.hpp"
+#include "ops/kernels/weight_gradient.hpp"
 
 // A multilayer perceptron over a tile of kTile particles, one particle a lane. Activations are
 // planes [row, kTile]; the weights stream past accumulators that stay in registers, so that the
@@ -10,9 +13,17 @@
 namespace uniphy::kernels {
 inline namespace UNIPHY_ISA {
 
-/// out = bias + W in for one tile: `packed` is [padded(rows) / 4, cols, 4]. A null bias is zero.
+/// An output layer, and the first one backwards.
 template <class T>
-inline void tile_linear(int rows, int cols, const T* packed, const T* bias, const T* in, T* out) {
+struct AsIs {
+  Lanes<T> operator()(const Lanes<T>& v, std::ptrdiff_t) const { return v; }
+};
+
+/// out = finish(bias + W in) for one tile: `packed` is [padded(rows) / 4, cols, 4], a null bias is
+/// zero, and finish(v, k) is what becomes of the numbers from k on.
+template <class T, class Finish>
+inline void tile_linear(int rows, int cols, const T* packed, const T* bias, const T* in, T* out,
+                        const Finish& finish) {
   using V = Lanes<T>;
   constexpr int w = width_of<V>;
   // Four vectors of a 32-register file, two of a 16-register one.
@@ -34,30 +45,59 @@ inline void tile_linear(int rows, int cols, const T* packed, const T* bias, cons
       for (int o = 0; o < kOutputBlock; ++o)
         for (int g = 0; g < kGroup; ++g)
           sum[o][g].store_aligned(out + std::ptrdiff_t(r + o) * kTile + l + g * w);
+      if constexpr (std::is_same_v<Finish, AsIs<T>>) continue;
+        // A loop, and no work on the sums themselves: with all of them in registers there is no
+        // room for what an activation needs.
+#pragma GCC unroll 1
+      for (int o = 0; o < kOutputBlock; ++o) {
+#pragma GCC unroll 4
+        for (int g = 0; g < kGroup; ++g) {
+          const std::ptrdiff_t at = std::ptrdiff_t(r + o) * kTile + l + g * w;
+          finish(V::load_aligned(out + at), at).store_aligned(out + at);
+        }
+      }
     }
   }
 }
 
-template <Activation A, class T>
-inline void tile_activate(int rows, T* value, T* slope) {
-  using V = Lanes<T>;
-  for (std::ptrdiff_t k = 0; k < rows * kTile; k += width_of<V>) {
-    V d;
-    const V y = activate<A>(V::load_aligned(value + k), slope ? &d : nullptr);
-    y.store_aligned(value + k);
-    if (slope) d.store_aligned(slope + k);
-  }
-}
-
+/// Backwards through a hidden layer.
 template <class T>
-inline void tile_activate(Activation a, int rows, T* value, T* slope) {
-  switch (a) {
+struct TimesSlope {
+  const T* slope;
+  Lanes<T> operator()(const Lanes<T>& v, std::ptrdiff_t at) const {
+    return v * Lanes<T>::load_aligned(slope + at);
+  }
+};
+/// A hidden layer; with `keep` the slopes are stored.
+template <Activation A, bool keep, class T>
+struct Activated {
+  T* slope;
+  UNIPHY_INLINE Lanes<T> operator()(const Lanes<T>& v, std::ptrdiff_t at) const {
+    Lanes<T> d;
+    const Lanes<T> y = activate<A>(v, keep ? &d : nullptr);
+    if (keep) d.store_aligned(slope + at);
+    return y;
+  }
+};
+
+template <Activation A, bool keep, class T>
+UNIPHY_NOINLINE void hidden_layer(const PackedLayer<T>& layer, const T* in, T* out, T* slope) {
+  tile_linear(layer.out, layer.in, layer.forward, layer.bias, in, out,
+              Activated<A, keep, T>{slope});
+}
+/// Layer k, its activation included; slope may be null.
+template <bool keep, class T>
+inline void layer_forward(const PackedMlp<T>& net, int k, const T* in, T* out, T* slope) {
+  const PackedLayer<T>& layer = net.layer[k];
+  if (k + 1 == net.depth)
+    return tile_linear(layer.out, layer.in, layer.forward, layer.bias, in, out, AsIs<T>{});
+  switch (net.activation) {
     case Activation::gelu:
-      return tile_activate<Activation::gelu>(rows, value, slope);
+      return hidden_layer<Activation::gelu, keep>(layer, in, out, slope);
     case Activation::silu:
-      return tile_activate<Activation::silu>(rows, value, slope);
+      return hidden_layer<Activation::silu, keep>(layer, in, out, slope);
     case Activation::squareplus:
-      return tile_activate<Activation::squareplus>(rows, value, slope);
+      return hidden_layer<Activation::squareplus, keep>(layer, in, out, slope);
   }
 }
 
@@ -68,10 +108,8 @@ inline T* mlp_forward(const PackedMlp<T>& net, const T* in, T* scratch) {
   T* buffer[2] = {scratch, scratch + net.max_width * kTile};
   const T* from = in;
   for (int k = 0; k < net.depth; ++k) {
-    const PackedLayer<T>& layer = net.layer[k];
     T* to = buffer[k % 2];
-    tile_linear(layer.out, layer.in, layer.forward, layer.bias, from, to);
-    if (k + 1 < net.depth) tile_activate<T>(net.activation, layer.out, to, nullptr);
+    layer_forward<false, T>(net, k, from, to, nullptr);
     from = to;
   }
   return buffer[(net.depth - 1) % 2];
@@ -88,57 +126,18 @@ UNIPHY_INLINE T* tape_slope(const PackedMlp<T>& net, T* tape, int k) {
   return tape + std::ptrdiff_t(2 * k + 1) * net.max_width * kTile;
 }
 
-/// mlp_forward that keeps what mlp_backward needs in `tape` (tape_scratch() numbers).
+/// mlp_forward that keeps what mlp_backward needs in `tape` (tape_scratch() numbers). With
+/// hidden_only, which is all that mlp_backward asks for, the result is not computed.
 template <class T>
-inline T* mlp_forward_tape(const PackedMlp<T>& net, const T* in, T* tape) {
+inline T* mlp_forward_tape(const PackedMlp<T>& net, const T* in, T* tape,
+                           bool hidden_only = false) {
   const T* from = in;
-  for (int k = 0; k < net.depth; ++k) {
-    const PackedLayer<T>& layer = net.layer[k];
+  for (int k = 0; k < (hidden_only ? net.depth - 1 : net.depth); ++k) {
     T* to = tape_value(net, tape, k);
-    tile_linear(layer.out, layer.in, layer.forward, layer.bias, from, to);
-    if (k + 1 < net.depth) tile_activate(net.activation, layer.out, to, tape_slope(net, tape, k));
+    layer_forward<true>(net, k, from, to, tape_slope(net, tape, k));
     from = to;
   }
   return tape_value(net, tape, net.depth - 1);
-}
-
-template <class T>
-UNIPHY_INLINE T plane_sum(const T* plane) {
-  using V = Lanes<T>;
-  V sum = V::load_aligned(plane);
-  for (std::ptrdiff_t l = width_of<V>; l < kTile; l += width_of<V>)
-    sum = sum + V::load_aligned(plane + l);
-  return lane_sum(sum);
-}
-
-/// Adds the gradients of one layer's weight and bias. Blocks of them stay in registers over a tile;
-/// rows of the last blocks beyond `out` and `in` are read but count for nothing.
-template <class T>
-inline void tile_weight_gradient(int out, int in, const T* grad, const T* from,
-                                 const WeightGradient<T>& to) {
-  using V = Lanes<T>;
-  constexpr int w = width_of<V>;
-  // 16 sums of a 32-register file, 8 of a 16-register one.
-  constexpr int kOut = w * sizeof(T) >= 64 ? 4 : 2, kIn = 4;
-  for (int o = 0; o < out; o += kOut) {
-    for (int i = 0; i < in; i += kIn) {
-      V sum[kOut * kIn];
-      for (V& s : sum) s = V(T(0));
-      for (std::ptrdiff_t l = 0; l < kTile; l += w) {
-        V x[kIn];
-        for (int b = 0; b < kIn; ++b) x[b] = V::load_aligned(from + (i + b) * kTile + l);
-        for (int a = 0; a < kOut; ++a) {
-          const V g = V::load_aligned(grad + (o + a) * kTile + l);
-          for (int b = 0; b < kIn; ++b) sum[a * kIn + b] = fma(g, x[b], sum[a * kIn + b]);
-        }
-      }
-      for (int a = 0; a < kOut && o + a < out; ++a)
-        for (int b = 0; b < kIn && i + b < in; ++b)
-          to.weight[(o + a) * in + i + b] += quick_lane_sum(sum[a * kIn + b]);
-    }
-    for (int a = 0; a < kOut && o + a < out; ++a)
-      to.bias[o + a] += plane_sum(grad + (o + a) * kTile);
-  }
 }
 
 /// grad_out [padded(out), kTile] → grad_in [padded(in), kTile] (may be null), given the tape of the
@@ -148,27 +147,25 @@ inline void tile_weight_gradient(int out, int in, const T* grad, const T* from,
 template <class T>
 inline void mlp_backward(const PackedMlp<T>& net, const T* in, T* tape, const T* grad_out,
                          T* grad_in, T* first_bias, const WeightGradient<T>* weights) {
-  using V = Lanes<T>;
-  constexpr int w = width_of<V>;
   T* buffer[2] = {tape_value(net, tape, net.depth), tape_slope(net, tape, net.depth)};
   const T* grad = grad_out;
   for (int k = net.depth - 1; k >= 0; --k) {
     const PackedLayer<T>& layer = net.layer[k];
     if (weights) {
       const T* from = k == 0 ? in : tape_value(net, tape, k - 1);
-      tile_weight_gradient(layer.out, layer.in, grad, from, weights[k]);
+      tile_weight_gradient(layer.out, layer.in, grad, from, tape_value(net, tape, net.depth + 1),
+                           weights[k]);
     }
     if (k == 0) {
       if (first_bias)
         for (int o = 0; o < layer.out; ++o) first_bias[o] += plane_sum(grad + o * kTile);
-      if (grad_in) tile_linear<T>(layer.in, layer.out, layer.backward, nullptr, grad, grad_in);
+      if (grad_in)
+        tile_linear<T>(layer.in, layer.out, layer.backward, nullptr, grad, grad_in, AsIs<T>{});
       return;
     }
     T* to = buffer[k % 2];
-    tile_linear<T>(layer.in, layer.out, layer.backward, nullptr, grad, to);
-    const T* slope = tape_slope(net, tape, k - 1);
-    for (std::ptrdiff_t n = 0; n < layer.in * kTile; n += w)
-      (V::load_aligned(to + n) * V::load_aligned(slope + n)).store_aligned(to + n);
+    tile_linear<T>(layer.in, layer.out, layer.backward, nullptr, grad, to,
+                   TimesSlope<T>{tape_slope(net, tape, k - 1)});
     grad = to;
   }
 }

@@ -12,6 +12,9 @@ inline constexpr std::ptrdiff_t kTile = kLawChunk;
 /// Outputs that are computed together; packed rows are padded with zeros to a multiple of it.
 inline constexpr int kOutputBlock = 4;
 
+/// Rows of a weight's gradient are padded to whole vectors of any instruction set.
+constexpr std::ptrdiff_t weight_stride(int in) { return (in + 15) / 16 * 16; }
+
 constexpr int padded(int n) { return (n + kOutputBlock - 1) / kOutputBlock * kOutputBlock; }
 
 /// One layer as the kernels read it. All pointers are borrowed.
@@ -37,9 +40,9 @@ struct PackedMlp {
   /// Scratch numbers for mlp_forward: two activation buffers.
   std::ptrdiff_t forward_scratch() const { return 2 * std::ptrdiff_t(max_width) * kTile; }
   /// Scratch numbers for mlp_forward_tape + mlp_backward: values and slopes of each hidden layer,
-  /// and two gradient buffers.
+  /// two gradient buffers, and what a layer takes with particles and inputs exchanged.
   std::ptrdiff_t tape_scratch() const {
-    return 2 * std::ptrdiff_t(depth + 1) * std::ptrdiff_t(max_width) * kTile;
+    return (2 * std::ptrdiff_t(depth + 1) * max_width + weight_stride(max_width)) * kTile;
   }
 };
 
