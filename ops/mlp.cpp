@@ -48,8 +48,7 @@ void check(const torch::Tensor& x, const std::vector<LinearLayer>& layers) {
   check_layers(x.size(1), x.scalar_type(), layers);
 }
 
-void check(const torch::Tensor& features, const torch::Tensor& z,
-           const std::vector<LinearLayer>& layers) {
+void check(const torch::Tensor& features, const torch::Tensor& z) {
   if (features.dim() != 3 || !torch::isFloatingType(features.scalar_type()))
     throw Error(
         "mlp: features: expected a floating-point tensor [codes, samples, features], found " +
@@ -57,7 +56,29 @@ void check(const torch::Tensor& features, const torch::Tensor& z,
   if (z.dim() != 2 || z.size(0) != features.size(0) || z.scalar_type() != features.scalar_type())
     throw Error("mlp: z: expected [" + std::to_string(features.size(0)) + ", any] of type " +
                 std::string(torch::toString(features.scalar_type())) + ", found " + shape_of(z));
+}
+
+void check(const torch::Tensor& features, const torch::Tensor& z,
+           const std::vector<LinearLayer>& layers) {
+  check(features, z);
   check_layers(features.size(2) + z.size(1), features.scalar_type(), layers);
+}
+
+void check(const torch::Tensor& features, const torch::Tensor& z, const FlatLayers& flat) {
+  check(features, z);
+  std::int64_t numbers = 0;
+  for (std::size_t k = 0; k + 1 < flat.widths.size(); ++k)
+    numbers += (flat.widths[k] + 1) * flat.widths[k + 1];
+  const std::int64_t in = features.size(2) + z.size(1);
+  if (flat.widths.size() < 2 || flat.widths.front() != in)
+    throw Error("mlp: layers: expected one or more, the first of which takes " +
+                std::to_string(in) + " numbers, found " +
+                (flat.widths.empty() ? std::string("none") : std::to_string(flat.widths.front())));
+  if (flat.numbers.dim() != 1 || flat.numbers.numel() != numbers ||
+      flat.numbers.scalar_type() != features.scalar_type())
+    throw Error("mlp: layers: expected [" + std::to_string(numbers) + "] numbers of type " +
+                std::string(torch::toString(features.scalar_type())) + ", found " +
+                shape_of(flat.numbers));
 }
 
 template <class T>
@@ -238,17 +259,10 @@ struct MlpFunction : torch::autograd::Function<MlpFunction> {
   }
 };
 
-torch::Tensor apply(const torch::Tensor& features, const torch::Tensor& z,
-                    const std::vector<LinearLayer>& layers, kernels::Activation activation) {
-  variable_list tensors;
-  std::vector<std::int64_t> widths{features.size(2) + z.size(1)};
-  for (const LinearLayer& layer : layers) {
-    tensors.push_back(layer.weight.reshape({-1}));
-    tensors.push_back(layer.bias);
-    widths.push_back(layer.weight.size(0));
-  }
-  return MlpFunction::apply(features.contiguous(), z.contiguous(), torch::cat(tensors), widths,
-                            static_cast<std::int64_t>(activation));
+torch::Tensor apply(const torch::Tensor& features, const torch::Tensor& z, const FlatLayers& flat,
+                    kernels::Activation activation) {
+  return MlpFunction::apply(features.contiguous(), z.contiguous(), flat.numbers.contiguous(),
+                            flat.widths, static_cast<std::int64_t>(activation));
 }
 
 /// z beside every sample: [codes, samples, features + latent].
@@ -272,22 +286,55 @@ torch::Tensor activate(const torch::Tensor& x, kernels::Activation activation) {
 
 }  // namespace
 
+std::vector<LinearLayer> layers_of(const FlatLayers& flat) {
+  std::vector<LinearLayer> layers;
+  std::int64_t at = 0;
+  for (std::size_t k = 0; k + 1 < flat.widths.size(); ++k) {
+    const std::int64_t in = flat.widths[k], out = flat.widths[k + 1];
+    const torch::Tensor weight = flat.numbers.narrow(0, at, in * out).view({out, in});
+    layers.push_back({weight, flat.numbers.narrow(0, at + in * out, out)});
+    at += (in + 1) * out;
+  }
+  return layers;
+}
+
+FlatLayers flatten(const std::vector<LinearLayer>& layers) {
+  variable_list tensors;
+  std::vector<std::int64_t> widths{layers.front().weight.size(1)};
+  for (const LinearLayer& layer : layers) {
+    tensors.push_back(layer.weight.reshape({-1}));
+    tensors.push_back(layer.bias);
+    widths.push_back(layer.weight.size(0));
+  }
+  return {torch::cat(tensors), widths};
+}
+
 torch::Tensor mlp(const torch::Tensor& x, const std::vector<LinearLayer>& layers,
                   kernels::Activation activation) {
   if (PlainTensors::asked_for()) return mlp_reference(x, layers, activation);
   check(x, layers);
-  return apply(x.unsqueeze(0), torch::empty({1, 0}, x.options()), layers, activation).squeeze(0);
+  return apply(x.unsqueeze(0), torch::empty({1, 0}, x.options()), flatten(layers), activation)
+      .squeeze(0);
+}
+
+torch::Tensor mlp(const torch::Tensor& features, const torch::Tensor& z, const FlatLayers& layers,
+                  kernels::Activation activation) {
+  check(features, z, layers);
+  const std::int64_t n = features.size(0), m = features.size(1), out = layers.widths.back();
+  // A tile belongs to one code: with few samples each, most of it would be empty.
+  if (!PlainTensors::asked_for() && m >= kTile / 2) return apply(features, z, layers, activation);
+  const torch::Tensor x = beside(features, z).flatten(0, 1);
+  const torch::Tensor y =
+      PlainTensors::asked_for()
+          ? mlp_reference(x, layers_of(layers), activation)
+          : apply(x.unsqueeze(0), torch::empty({1, 0}, x.options()), layers, activation);
+  return y.view({n, m, out});
 }
 
 torch::Tensor mlp(const torch::Tensor& features, const torch::Tensor& z,
                   const std::vector<LinearLayer>& layers, kernels::Activation activation) {
   check(features, z, layers);
-  // A tile belongs to one code: with few samples each, most of it would be empty.
-  if (!PlainTensors::asked_for() && features.size(1) >= kTile / 2)
-    return apply(features, z, layers, activation);
-  const torch::Tensor x = beside(features, z);
-  return mlp(x.flatten(0, 1), layers, activation)
-      .view({features.size(0), features.size(1), layers.back().weight.size(0)});
+  return mlp(features, z, flatten(layers), activation);
 }
 
 torch::Tensor mlp_reference(const torch::Tensor& x, const std::vector<LinearLayer>& layers,

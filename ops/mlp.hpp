@@ -2,6 +2,7 @@
 
 #include <torch/torch.h>
 
+#include <cstdint>
 #include <vector>
 
 #include "ops/kernels/learned_law_weights.hpp"
@@ -13,6 +14,18 @@ struct LinearLayer {
   torch::Tensor weight;
   torch::Tensor bias;
 };
+
+/// A whole network in one tensor, for optimizers, whose cost is by the tensor: the weight,
+/// row-major, and the bias of each layer one after the other, [P]. widths: what each layer takes,
+/// then what the last one gives.
+struct FlatLayers {
+  torch::Tensor numbers;
+  std::vector<std::int64_t> widths;
+};
+/// Views of the numbers; gradients go through.
+std::vector<LinearLayer> layers_of(const FlatLayers& flat);
+/// A copy; gradients go through.
+FlatLayers flatten(const std::vector<LinearLayer>& layers);
 
 /// A multilayer perceptron as one op: x [S, in] → [S, out], differentiable by x and by every weight
 /// and bias. The activation follows every layer but the last. The fused kernel walks tiles of
@@ -27,6 +40,9 @@ torch::Tensor mlp(const torch::Tensor& x, const std::vector<LinearLayer>& layers
 /// too.
 torch::Tensor mlp(const torch::Tensor& features, const torch::Tensor& z,
                   const std::vector<LinearLayer>& layers, kernels::Activation activation);
+
+torch::Tensor mlp(const torch::Tensor& features, const torch::Tensor& z, const FlatLayers& layers,
+                  kernels::Activation activation);
 
 /// The first of these in plain tensor operations.
 torch::Tensor mlp_reference(const torch::Tensor& x, const std::vector<LinearLayer>& layers,

@@ -6,10 +6,17 @@ namespace uniphy {
 namespace {
 
 using kernels::MlpWeights;
+using ops::FlatLayers;
 using ops::LinearLayer;
 
-std::vector<LinearLayer> random_mlp(std::int64_t in, std::int64_t out, const NetworkOptions& o,
-                                    torch::Generator& generator) {
+FlatLayers leaf(const std::vector<LinearLayer>& layers) {
+  FlatLayers flat = ops::flatten(layers);
+  flat.numbers.requires_grad_();
+  return flat;
+}
+
+FlatLayers random_mlp(std::int64_t in, std::int64_t out, const NetworkOptions& o,
+                      torch::Generator& generator) {
   std::vector<LinearLayer> layers;
   for (std::int64_t k = 0; k <= o.hidden_layers; ++k) {
     const std::int64_t from = k == 0 ? in + o.latent_size : o.width;
@@ -21,14 +28,14 @@ std::vector<LinearLayer> random_mlp(std::int64_t in, std::int64_t out, const Net
     torch::Tensor weight = torch::randn({to, from}, generator, torch::kFloat32) * deviation;
     torch::Tensor bias =
         last ? torch::zeros({to}) : torch::randn({to}, generator, torch::kFloat32) * 0.1;
-    layers.push_back({weight.requires_grad_(), bias.requires_grad_()});
+    layers.push_back({weight, bias});
   }
-  return layers;
+  return leaf(layers);
 }
 
-MlpWeights numbers(const std::vector<LinearLayer>& layers) {
+MlpWeights numbers(const FlatLayers& flat) {
   MlpWeights mlp;
-  for (const LinearLayer& layer : layers) {
+  for (const LinearLayer& layer : ops::layers_of(flat)) {
     const torch::Tensor weight = layer.weight.detach().to(torch::kFloat64).contiguous();
     const torch::Tensor bias = layer.bias.detach().to(torch::kFloat64).contiguous();
     const double *w = weight.data_ptr<double>(), *b = bias.data_ptr<double>();
@@ -38,16 +45,16 @@ MlpWeights numbers(const std::vector<LinearLayer>& layers) {
   return mlp;
 }
 
-std::vector<LinearLayer> tensors(const MlpWeights& mlp) {
+FlatLayers tensors(const MlpWeights& mlp) {
   std::vector<LinearLayer> layers;
   for (const MlpWeights::Layer& layer : mlp.layers) {
     const auto options = torch::TensorOptions().dtype(torch::kFloat64);
     const torch::Tensor weight =
         torch::tensor(layer.weight, options).view({layer.out, layer.in}).to(torch::kFloat32);
     const torch::Tensor bias = torch::tensor(layer.bias, options).to(torch::kFloat32);
-    layers.push_back({weight.clone().requires_grad_(), bias.clone().requires_grad_()});
+    layers.push_back({weight, bias});
   }
-  return layers;
+  return leaf(layers);
 }
 
 }  // namespace
@@ -60,11 +67,11 @@ Networks Networks::random(const NetworkOptions& options, torch::Generator& gener
   n.stress = random_mlp(shape.stress_in, shape.stress_out, options, generator);
   if (options.form == kernels::LawForm::isotropic) {
     torch::NoGradGuard no_grad;
-    if (!options.state_caps) n.projection.front().weight.narrow(1, 0, shape.projection_in).zero_();
-    if (!options.state_moduli) n.stress.front().weight.narrow(1, 0, shape.stress_in).zero_();
+    const auto caps = ops::layers_of(n.projection), moduli = ops::layers_of(n.stress);
+    if (!options.state_caps) caps.front().weight.narrow(1, 0, shape.projection_in).zero_();
+    if (!options.state_moduli) moduli.front().weight.narrow(1, 0, shape.stress_in).zero_();
     // Between the materials' exponents, and off γ = 0, where the derivative to γ vanishes.
-    n.stress.back().bias[5].fill_(1);
-    n.stress.back().bias[6].fill_(1);
+    moduli.back().bias.narrow(0, 5, 2).fill_(1);
   }
   return n;
 }
@@ -95,13 +102,7 @@ kernels::LearnedLawWeights Networks::weights() const {
 }
 
 std::vector<torch::Tensor> Networks::parameters() const {
-  std::vector<torch::Tensor> all;
-  for (const auto* network : {&projection, &stress})
-    for (const LinearLayer& layer : *network) {
-      all.push_back(layer.weight);
-      all.push_back(layer.bias);
-    }
-  return all;
+  return {projection.numbers, stress.numbers};
 }
 
 std::int64_t Networks::parameter_count() const {
@@ -112,8 +113,8 @@ std::int64_t Networks::parameter_count() const {
 
 Networks Networks::frozen() const {
   Networks n = *this;
-  for (auto* network : {&n.projection, &n.stress})
-    for (LinearLayer& layer : *network) layer = {layer.weight.detach(), layer.bias.detach()};
+  n.projection.numbers = projection.numbers.detach();
+  n.stress.numbers = stress.numbers.detach();
   return n;
 }
 

@@ -22,11 +22,11 @@ struct NetworkOptions {
   bool state_moduli = false;
 };
 
-/// The two networks as leaf tensors (float32) that an optimizer moves.
+/// The two networks as leaf tensors (float32), one each, that an optimizer moves.
 struct Networks {
   NetworkOptions options;
-  std::vector<ops::LinearLayer> projection;
-  std::vector<ops::LinearLayer> stress;
+  ops::FlatLayers projection;
+  ops::FlatLayers stress;
 
   /// Kaiming weights for the hidden layers and a small last layer, from the generator.
   static Networks random(const NetworkOptions& options, torch::Generator& generator);

@@ -9,8 +9,8 @@ using torch::square;
 using torch::Tensor;
 
 /// The network on [N, m, features] with z [N, Z] beside every sample → [N, m, out].
-Tensor network(const std::vector<ops::LinearLayer>& layers, const Networks& networks,
-               const Tensor& features, const Tensor& z) {
+Tensor network(const ops::FlatLayers& layers, const Networks& networks, const Tensor& features,
+               const Tensor& z) {
   return ops::mlp(features, z, layers, networks.options.activation);
 }
 
