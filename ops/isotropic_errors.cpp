@@ -8,6 +8,7 @@
 #include "ops/kernels/error.hpp"
 #include "ops/kernels/learned_law_weights.hpp"
 #include "ops/plain_tensors.hpp"
+#include "ops/planes.hpp"
 #include "ops/reference/isotropic_errors.hpp"
 #include "ops/tensor_check.hpp"
 
@@ -46,12 +47,13 @@ void check_batch(const char* op, Arguments& a) {
                   ", found " + std::to_string(row[k]));
 }
 
-/// One answer for each sample, or one for all.
+/// One answer for each sample, or one for all; number by number in memory.
 Tensor checked_answers(const char* name, const Tensor& t, const Arguments& a,
                        std::int64_t outputs) {
   const std::int64_t m = t.defined() && t.dim() == 3 && t.size(1) == 1 ? 1 : a.samples();
-  return checked("isotropic_errors", name, t, a.columns.scalar_type(),
-                 {a.trajectories(), m, outputs});
+  check_tensor("isotropic_errors", name, t, a.columns.scalar_type(),
+               {a.trajectories(), m, outputs});
+  return in_planes(t);
 }
 
 template <class T>
@@ -159,7 +161,7 @@ class IsotropicErrorsFunction : public torch::autograd::Function<IsotropicErrors
       return ctx->needs_input_grad(k) ? torch::zeros_like(s[k]) : Tensor();
     };
     const auto empty = [&](std::size_t k) {
-      return ctx->needs_input_grad(k) ? torch::empty_like(s[k]) : Tensor();
+      return ctx->needs_input_grad(k) ? empty_planes(s[k].sizes(), s[k].options()) : Tensor();
     };
     const Gradients to{zeros(0), empty(1), zeros(2), empty(3), zeros(4)};
     const Tensor grad_losses = grad[0].contiguous();
@@ -181,8 +183,8 @@ class IsotropicFeaturesFunction : public torch::autograd::Function<IsotropicFeat
     Arguments a;
     a.columns = columns, a.rows = rows, a.z = z;
     const std::int64_t n = a.trajectories(), m = a.samples();
-    const Tensor projection = torch::empty({n, m, 3}, z.options());
-    const Tensor stress = torch::empty({n, m, 6}, z.options());
+    const Tensor projection = empty_planes({n, m, 3}, z.options());
+    const Tensor stress = empty_planes({n, m, 6}, z.options());
     for_real_type(z.scalar_type(), [&](auto zero) {
       using T = decltype(zero);
       const auto& table = kernels::isotropic_errors_table<T>();
@@ -207,7 +209,10 @@ class IsotropicFeaturesFunction : public torch::autograd::Function<IsotropicFeat
     for_real_type(a.z.scalar_type(), [&](auto zero) {
       using T = decltype(zero);
       const auto& table = kernels::isotropic_errors_table<T>();
-      const T *of_projection = gradient_data<T>(grad[0]), *of_stress = gradient_data<T>(grad[1]);
+      for (Tensor& g : grad)
+        if (g.defined()) g = in_planes(g);
+      const T* of_projection = grad[0].defined() ? grad[0].data_ptr<T>() : nullptr;
+      const T* of_stress = grad[1].defined() ? grad[1].data_ptr<T>() : nullptr;
       T* to = result[0].template data_ptr<T>();
 #pragma omp parallel for schedule(static)
       for (std::int64_t i = 0; i < n; ++i)

@@ -8,6 +8,7 @@
 #include "ops/kernels/learned_law_table.hpp"
 #include "ops/mlp_problem.hpp"
 #include "ops/plain_tensors.hpp"
+#include "ops/planes.hpp"
 #include "ops/tensor_check.hpp"
 
 namespace uniphy::ops {
@@ -88,26 +89,34 @@ MlpProblem<T> problem_of(const torch::Tensor& features, const torch::Tensor& z,
   return {features.size(0), features.size(1), z.size(1), flat.data_ptr<T>(), widths, activation};
 }
 
+/// For f numbers a sample, in the order of memory of `samples`: planes or rows.
+torch::Tensor like_samples(const torch::Tensor& samples, std::int64_t f) {
+  const std::int64_t n = samples.size(0), m = samples.size(1);
+  const bool planes = m > 1 && samples.stride(1) == 1;
+  return planes ? empty_planes({n, m, f}, samples.options())
+                : torch::empty({n, m, f}, samples.options());
+}
+
 template <class T>
 torch::Tensor forward(const MlpProblem<T>& problem, const torch::Tensor& features,
                       const torch::Tensor& z) {
   const auto& table = kernels::learned_law_table<T>();
   const kernels::PackedMlp<T>& net = problem.net();
-  torch::Tensor y = torch::empty({problem.codes, problem.per_code, net.out()}, features.options());
-  const T *from = features.data_ptr<T>(), *codes = z.data_ptr<T>();
-  T* to = y.data_ptr<T>();
+  const torch::Tensor y = like_samples(features, net.out());
+  const SamplesView<const T> from(features);
+  const SamplesView<T> to(y);
+  const T* codes = z.data_ptr<T>();
   const std::int64_t plane = std::int64_t(net.max_width) * kTile;
 #pragma omp parallel
   {
     FoldedMlp<T> folded(problem);
-    kernels::AlignedBuffer<T> scratch(2 * plane + net.tape_scratch());
-    T *in = scratch.data(), *out = in + plane, *tape = out + plane;
+    kernels::AlignedBuffer<T> buffer(plane + net.forward_scratch());
+    T *in = buffer.data(), *scratch = in + plane;
 #pragma omp for schedule(static)
     for (std::int64_t t = 0; t < problem.tiles(); ++t) {
-      const std::int64_t first = problem.first(t), count = problem.count(t);
-      to_planes(from + first * net.in(), count, net.in(), in);
-      table.mlp_forward(folded.of_code(codes + problem.code(t) * problem.latent), in, out, tape);
-      from_planes(out, count, net.out(), to + first * net.out());
+      const auto& of_code = folded.of_code(codes + problem.code(t) * problem.latent);
+      to_tile(problem, from, t, net.in(), in);
+      from_tile(problem, table.mlp_forward(of_code, in, scratch), t, net.out(), to);
     }
   }
   return y;
@@ -164,13 +173,14 @@ variable_list backward(const MlpProblem<T>& problem, const torch::Tensor& featur
   const std::int64_t sums = want_weights ? std::min(kSums, tiles) : kSums;
   const WeightSums<T> layout(net);
   torch::Tensor grad_features, grad_z, grad_flat;
-  if (want_features) grad_features = torch::empty_like(features);
+  if (want_features) grad_features = like_samples(features, n_in);
   kernels::AlignedBuffer<T> partial(want_weights ? sums * layout.size() : 0);
   partial.fill(T(0));
   const bool want_bias = latent > 0 && (want_z || want_weights);
   std::vector<T> first_bias(want_bias ? std::size_t(tiles * width) : 0, T(0));
-  const T *from = features.data_ptr<T>(), *codes = z.data_ptr<T>(), *grad_from = grad.data_ptr<T>();
-  T* grad_to = want_features ? grad_features.data_ptr<T>() : nullptr;
+  const SamplesView<const T> from(features), of_out(grad);
+  const SamplesView<T> to_features(grad_features);
+  const T* codes = z.data_ptr<T>();
 #pragma omp parallel
   {
     FoldedMlp<T> folded(problem);
@@ -182,15 +192,14 @@ variable_list backward(const MlpProblem<T>& problem, const torch::Tensor& featur
     for (std::int64_t sum = 0; sum < sums; ++sum) {
       if (want_weights) weights = layout.in(partial.data() + sum * layout.size());
       for (std::int64_t t = sum * tiles / sums; t < (sum + 1) * tiles / sums; ++t) {
-        const std::int64_t first = problem.first(t), count = problem.count(t);
         const auto& of_code = folded.of_code(codes + problem.code(t) * latent);
-        to_planes(from + first * n_in, count, n_in, in);
-        to_planes(grad_from + first * net.out(), count, net.out(), grad_out);
+        to_tile(problem, from, t, n_in, in);
+        to_tile(problem, of_out, t, net.out(), grad_out);
         table.mlp_tape(of_code, in, tape);
         table.mlp_backward(of_code, in, tape, grad_out, want_features ? grad_in : nullptr,
                            want_bias ? first_bias.data() + t * width : nullptr,
                            want_weights ? weights.data() : nullptr);
-        if (want_features) from_planes(grad_in, count, n_in, grad_to + first * n_in);
+        if (want_features) from_tile(problem, grad_in, t, n_in, to_features);
       }
     }
   }
@@ -244,8 +253,7 @@ struct MlpFunction : torch::autograd::Function<MlpFunction> {
     variable_list result(5);
     if (!grads[0].defined()) return result;
     const variable_list saved = ctx->get_saved_variables();
-    const torch::Tensor &features = saved[0], &z = saved[1], &flat = saved[2],
-                        grad = grads[0].contiguous();
+    const torch::Tensor &features = saved[0], &z = saved[1], &flat = saved[2], grad = grads[0];
     const std::vector<std::int64_t> widths = ctx->saved_data["widths"].toIntVector();
     const auto activation = static_cast<kernels::Activation>(ctx->saved_data["activation"].toInt());
     for_real_type(features.scalar_type(), [&](auto zero) {
@@ -261,8 +269,8 @@ struct MlpFunction : torch::autograd::Function<MlpFunction> {
 
 torch::Tensor apply(const torch::Tensor& features, const torch::Tensor& z, const FlatLayers& flat,
                     kernels::Activation activation) {
-  return MlpFunction::apply(features.contiguous(), z.contiguous(), flat.numbers.contiguous(),
-                            flat.widths, static_cast<std::int64_t>(activation));
+  return MlpFunction::apply(features, z.contiguous(), flat.numbers.contiguous(), flat.widths,
+                            static_cast<std::int64_t>(activation));
 }
 
 /// z beside every sample: [codes, samples, features + latent].

@@ -1,7 +1,10 @@
 #pragma once
 
+#include <torch/types.h>
+
 #include <algorithm>
 #include <cstdint>
+#include <type_traits>
 #include <vector>
 
 #include "ops/kernels/packed_mlp.hpp"
@@ -33,12 +36,10 @@ class MlpProblem {
   std::int64_t first_width() const { return net().layer[0].out; }
   std::int64_t in() const { return net().in() + latent; }
   std::int64_t code(std::int64_t tile) const { return tile / tiles_per_code; }
-  /// The first of the tile's samples among those of all codes, and how many they are.
-  std::int64_t first(std::int64_t tile) const {
-    return code(tile) * per_code + tile % tiles_per_code * kTile;
-  }
+  /// The first of the tile's samples among those of its code, and how many they are.
+  std::int64_t first(std::int64_t tile) const { return tile % tiles_per_code * kTile; }
   std::int64_t count(std::int64_t tile) const {
-    return std::min<std::int64_t>(kTile, per_code - tile % tiles_per_code * kTile);
+    return std::min<std::int64_t>(kTile, per_code - first(tile));
   }
   /// Element (o, k) of the part of the first weight that takes z.
   const T* latent_weight(std::int64_t o) const { return weight + o * in() + net().in(); }
@@ -93,18 +94,50 @@ class FoldedMlp {
   kernels::PackedMlp<T> net_;
 };
 
-/// Rows [first, first + kTile) of a row-major [samples, columns] as planes [columns, kTile];
-/// missing rows are zero.
+/// Samples [codes, per_code, numbers] in any order of memory.
 template <class T>
-inline void to_planes(const T* rows, std::int64_t count, std::int64_t columns, T* planes) {
-  for (std::int64_t c = 0; c < columns; ++c)
-    for (std::int64_t l = 0; l < kTile; ++l)
-      planes[c * kTile + l] = l < count ? rows[l * columns + c] : T(0);
+struct SamplesView {
+  T* data;
+  std::int64_t code_stride, sample_stride, number_stride;
+
+  SamplesView(const torch::Tensor& t)
+      : data(t.defined() ? t.data_ptr<std::remove_const_t<T>>() : nullptr),
+        code_stride(t.defined() ? t.stride(0) : 0),
+        sample_stride(t.defined() ? t.stride(1) : 0),
+        number_stride(t.defined() ? t.stride(2) : 0) {}
+  /// From the first sample of a tile on.
+  T* at(const MlpProblem<std::remove_const_t<T>>& problem, std::int64_t tile) const {
+    return data + problem.code(tile) * code_stride + problem.first(tile) * sample_stride;
+  }
+};
+
+/// The samples of tile t as planes [rows, kTile]; what is missing is zero.
+template <class T>
+void to_tile(const MlpProblem<T>& problem, const SamplesView<const T>& samples, std::int64_t t,
+             std::int64_t rows, T* tile) {
+  const T* from = samples.at(problem, t);
+  const std::int64_t count = problem.count(t), stride = samples.sample_stride;
+  for (std::int64_t r = 0; r < rows; ++r, from += samples.number_stride, tile += kTile) {
+    if (stride == 1) {
+      std::copy_n(from, count, tile);
+    } else {
+      for (std::int64_t l = 0; l < count; ++l) tile[l] = from[l * stride];
+    }
+    std::fill(tile + count, tile + kTile, T(0));
+  }
 }
 template <class T>
-inline void from_planes(const T* planes, std::int64_t count, std::int64_t columns, T* rows) {
-  for (std::int64_t l = 0; l < count; ++l)
-    for (std::int64_t c = 0; c < columns; ++c) rows[l * columns + c] = planes[c * kTile + l];
+void from_tile(const MlpProblem<T>& problem, const T* tile, std::int64_t t, std::int64_t rows,
+               const SamplesView<T>& samples) {
+  T* to = samples.at(problem, t);
+  const std::int64_t count = problem.count(t), stride = samples.sample_stride;
+  for (std::int64_t r = 0; r < rows; ++r, to += samples.number_stride, tile += kTile) {
+    if (stride == 1) {
+      std::copy_n(tile, count, to);
+    } else {
+      for (std::int64_t l = 0; l < count; ++l) to[l * stride] = tile[l];
+    }
+  }
 }
 
 }  // namespace uniphy::ops

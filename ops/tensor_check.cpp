@@ -21,14 +21,14 @@ std::string describe(const Tensor& t) {
 
 }  // namespace
 
-Tensor checked(const char* op, const char* name, const Tensor& t, torch::ScalarType dtype,
-               const std::vector<std::int64_t>& sizes) {
+void check_tensor(const char* op, const char* name, const Tensor& t, torch::ScalarType dtype,
+                  const std::vector<std::int64_t>& sizes) {
   bool fits = t.defined() && t.device().is_cpu() && t.scalar_type() == dtype &&
               t.dim() == static_cast<std::int64_t>(sizes.size());
   for (std::size_t i = 0; fits && i < sizes.size(); ++i) {
     fits = sizes[i] == kAnySize || t.size(static_cast<std::int64_t>(i)) == sizes[i];
   }
-  if (fits) return t.contiguous();
+  if (fits) return;
   std::ostringstream s;
   s << op << ": " << name << ": expected [";
   for (std::size_t i = 0; i < sizes.size(); ++i) {
@@ -41,6 +41,12 @@ Tensor checked(const char* op, const char* name, const Tensor& t, torch::ScalarT
   }
   s << "] " << dtype << " on cpu, found " << describe(t);
   throw Error(s.str());
+}
+
+Tensor checked(const char* op, const char* name, const Tensor& t, torch::ScalarType dtype,
+               const std::vector<std::int64_t>& sizes) {
+  check_tensor(op, name, t, dtype, sizes);
+  return t.contiguous();
 }
 
 torch::ScalarType real_type(const char* op, const char* name, const Tensor& t) {

@@ -9,8 +9,11 @@ namespace uniphy::ops {
 /// A size that may be anything.
 inline constexpr std::int64_t kAnySize = -1;
 
-/// The tensor, contiguous. Throws Error naming the op, the argument, what was expected and what was
-/// found, unless t is defined, on the CPU, of dtype `dtype` and of the given sizes.
+/// Throws Error naming the op, the argument, what was expected and what was found, unless t is
+/// defined, on the CPU, of dtype `dtype` and of the given sizes.
+void check_tensor(const char* op, const char* name, const torch::Tensor& t, torch::ScalarType dtype,
+                  const std::vector<std::int64_t>& sizes);
+/// The tensor, contiguous, after check_tensor.
 torch::Tensor checked(const char* op, const char* name, const torch::Tensor& t,
                       torch::ScalarType dtype, const std::vector<std::int64_t>& sizes);
 

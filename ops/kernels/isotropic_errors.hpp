@@ -100,7 +100,7 @@ UNIPHY_INLINE void load_answers(const T* from, bool of_state, std::ptrdiff_t fir
                                 std::ptrdiff_t count, V (&o)[outputs]) {
   for (int k = 0; k < outputs; ++k)
     o[k] =
-        of_state ? load_lanes<V, T>({from, outputs, 1}, first, k, count - first, T(0)) : V(from[k]);
+        of_state ? load_lanes<V, T>({from, 1, count}, first, k, count - first, T(0)) : V(from[k]);
 }
 
 /// The answers to one vector of samples; those that are constants are read once.

@@ -81,7 +81,7 @@ class OutputGradients {
     if (!to_) return;
     for (int k = 0; k < outputs; ++k) {
       if (of_state_)
-        store_lanes<V, T>({to_, outputs, 1}, first, k, count - first, g[k]);
+        store_lanes<V, T>({to_, 1, count}, first, k, count - first, g[k]);
       else
         sums_[k] = sums_[k] + g[k];
     }

@@ -39,8 +39,8 @@ struct IsotropicSamples {
 template <class T>
 struct IsotropicAnswers {
   IsotropicSamples<T> samples;
-  const T* caps;                  ///< [count or 1, 4]
-  const T* moduli;                ///< [count or 1, 8]
+  const T* caps;                  ///< [4, count or 1]
+  const T* moduli;                ///< [8, count or 1]
   bool state_caps, state_moduli;  ///< whether there is one for each sample
   T rest_cap;                     ///< min(c₂(rest), 0)
   T rest_pressure;                ///< a₀(rest)
@@ -78,7 +78,7 @@ struct IsotropicErrorsTable {
   /// weights [kIsotropicLosses]: dL/d(means).
   void (*errors_adjoint)(const IsotropicAnswers<T>&, const T* weights,
                          IsotropicAnswersGradient<T>& gradient);
-  /// What networks that answer to the state see: projection [count, 3], stress [count, 6].
+  /// What networks that answer to the state see: projection [3, count], stress [6, count].
   void (*features)(const IsotropicSamples<T>&, T* projection, T* stress);
   /// dL/d(log e), given those of the features, either of which may be null.
   T (*features_adjoint)(const IsotropicSamples<T>&, const T* grad_projection, const T* grad_stress);

@@ -108,21 +108,21 @@ inline void isotropic_features(const IsotropicSamples<T>& samples, T* projection
   const V inv_e(T(1) / samples.strain_scale);
   for (std::ptrdiff_t l = 0; l < samples.count; l += width_of<V>) {
     const SampleLanes<V> sample(samples, l);
-    const auto put = [&](T* to, int of, int k, const V& value) {
-      store_lanes<V, T>({to + l * of, of, 1}, 0, k, samples.count - l, value);
+    const auto put = [&](T* to, int k, const V& value) {
+      store_lanes<V, T>({to, 1, samples.count}, l, k, samples.count - l, value);
     };
     const HenckyStrain<V> trial = trial_strain(sample, false);
     const StrainInvariants<V> v = strain_invariants(trial, inv_e);
-    put(projection, 3, 0, trial.trace * inv_e);
-    put(projection, 3, 1, v.q);
-    put(projection, 3, 2, v.cubic);
+    put(projection, 0, trial.trace * inv_e);
+    put(projection, 1, v.q);
+    put(projection, 2, v.cubic);
     const StressState<V> s = sample_state(sample, inv_e);
-    put(stress, 6, 0, s.volumetric);
-    put(stress, 6, 1, s.invariants.q);
-    put(stress, 6, 2, s.invariants.cubic);
-    put(stress, 6, 3, s.rate_trace);
-    put(stress, 6, 4, s.rate_norm);
-    put(stress, 6, 5, s.x);
+    put(stress, 0, s.volumetric);
+    put(stress, 1, s.invariants.q);
+    put(stress, 2, s.invariants.cubic);
+    put(stress, 3, s.rate_trace);
+    put(stress, 4, s.rate_norm);
+    put(stress, 5, s.x);
   }
 }
 
@@ -136,22 +136,22 @@ inline T isotropic_features_adjoint(const IsotropicSamples<T>& samples, const T*
   for (std::ptrdiff_t l = 0; l < samples.count; l += width_of<V>) {
     const SampleLanes<V> sample(samples, l);
     // Missing lanes read zero gradients.
-    const auto gradient = [&](const T* from, int of, int k) {
-      return load_lanes<V, T>({from + l * of, of, 1}, 0, k, samples.count - l, T(0));
+    const auto gradient = [&](const T* from, int k) {
+      return load_lanes<V, T>({from, 1, samples.count}, l, k, samples.count - l, T(0));
     };
     // Everything but the rate goes as 1/e, through t/e and w = ε̂/e.
     if (grad_projection) {
       const HenckyStrain<V> trial = trial_strain(sample, false);
       const StrainInvariants<V> v = strain_invariants(trial, inv_e);
-      const V g_q = gradient(grad_projection, 3, 1), g_cubic = gradient(grad_projection, 3, 2);
-      log_e = log_e - gradient(grad_projection, 3, 0) * trial.trace * inv_e;
+      const V g_q = gradient(grad_projection, 1), g_cubic = gradient(grad_projection, 2);
+      log_e = log_e - gradient(grad_projection, 0) * trial.trace * inv_e;
       for (int i = 0; i < 3; ++i)
         log_e = log_e - fma(g_cubic, v.d_cubic[i], g_q * v.w[i] * v.inverse_root) * v.w[i];
     }
     if (grad_stress) {
       const StressState<V> s = sample_state(sample, inv_e);
       V f[6];
-      for (int k = 0; k < 6; ++k) f[k] = gradient(grad_stress, 6, k);
+      for (int k = 0; k < 6; ++k) f[k] = gradient(grad_stress, k);
       const FeatureGradients<V> of = feature_gradients(s, f);
       const StrainInvariants<V>& v = s.invariants;
       log_e = log_e - f[0] * s.volumetric;

@@ -197,12 +197,15 @@ class LearnedLawKernel final : public LawKernel<T> {
   AlignedBuffer<T> at_rest(const PackedMlp<T>& net, const T* weight = nullptr,
                            T* bias = nullptr) const {
     const std::ptrdiff_t plane = std::ptrdiff_t(net.max_width) * kTile;
-    T* scratch = scratch_of_thread<T>(net.tape_scratch() + 2 * plane);
+    T* scratch =
+        scratch_of_thread<T>(std::max(net.forward_scratch(), net.tape_scratch()) + 2 * plane);
     T *in = scratch, *grad = in + plane, *tape = grad + plane;
     std::fill_n(in, 2 * plane, T(0));
     AlignedBuffer<T> out(padded(net.out()) * kTile);
-    table_.mlp_forward(net, in, out.data(), tape);
+    const T* result = table_.mlp_forward(net, in, tape);
+    std::copy_n(result, out.size(), out.data());
     if (bias) {
+      table_.mlp_tape(net, in, tape);
       for (int o = 0; o < net.out(); ++o) grad[o * kTile] = weight[o];  // one particle of the tile
       table_.mlp_backward(net, in, tape, grad, nullptr, bias, nullptr);
     }

@@ -49,12 +49,12 @@ struct LearnedLawTable {
   void (*adjoint)(const LearnedLaw<T>&, std::ptrdiff_t count, View<const T> F_trial,
                   View<const T> C, View<const T> grad_F_proj, View<const T> grad_tau,
                   View<T> grad_F_trial, View<T> grad_C, T* accumulator, T* scratch);
-  /// A bare network on one tile of planes: in [padded(in), kTile] → out [padded(out), kTile].
-  /// scratch: tape_scratch() numbers, which then hold the tape.
-  void (*mlp_forward)(const PackedMlp<T>&, const T* in, T* out, T* scratch);
-  /// mlp_forward as far as mlp_backward needs it: the tape alone.
+  /// A bare network on one tile of planes: in [padded(in), kTile] → [padded(out), kTile] in
+  /// `scratch` of forward_scratch() numbers.
+  const T* (*mlp_forward)(const PackedMlp<T>&, const T* in, T* scratch);
+  /// What mlp_backward needs of mlp_forward: a tape of tape_scratch() numbers.
   void (*mlp_tape)(const PackedMlp<T>&, const T* in, T* tape);
-  /// The adjoint of the mlp_forward or mlp_tape that filled `tape`; grad_in, first_bias, weights may be null.
+  /// The adjoint, given the tape; grad_in, first_bias, weights may be null.
   void (*mlp_backward)(const PackedMlp<T>&, const T* in, T* tape, const T* grad_out, T* grad_in,
                        T* first_bias, const WeightGradient<T>* weights);
 };

@@ -27,11 +27,12 @@ struct Trajectory {
     columns.assign(c.columns.begin(), c.columns.end());
     rows.assign(c.rows.begin(), c.rows.begin() + c.samples);
     inputs = {9.2 + 3 * c.z[0], -3 + 2 * c.z[1], -0.3, 0.2};
-    const auto append = [this](const std::vector<double>& v, std::int64_t count) {
-      inputs.insert(inputs.end(), v.begin(), v.begin() + count);
+    const auto append = [this](const std::vector<double>& v, std::int64_t count, int outputs) {
+      for (int k = 0; k < outputs; ++k)
+        for (std::int64_t i = 0; i < count; ++i) inputs.push_back(v[i * outputs + k]);
     };
-    append(c.caps, (c.state_caps ? c.samples : 1) * 4);
-    append(c.moduli, (c.state_moduli ? c.samples : 1) * 8);
+    append(c.caps, c.state_caps ? c.samples : 1, 4);
+    append(c.moduli, c.state_moduli ? c.samples : 1, 8);
   }
 
   IsotropicAnswers<T> answers(const std::vector<double>& x) {
