@@ -4,6 +4,7 @@
 
 #include "ops/kernels/isotropic_errors_table.hpp"
 #include "ops/kernels/isotropic_stress.hpp"
+#include "ops/kernels/transpose4.hpp"
 
 // Vectors of samples of the isotropic form, and the features that networks see of them
 // (isotropic_law.hpp).
@@ -24,10 +25,21 @@ class SampleLanes {
     for (std::ptrdiff_t l = ahead; l < std::min(ahead + w, samples.count); ++l) fetch(samples, l);
     for (std::ptrdiff_t l = 0; first == 0 && l < std::min(ahead, samples.count); ++l)
       fetch(samples, l);
-    for (int l = 0; l < w; ++l) {
-      const std::ptrdiff_t at = std::min(first + l, samples.count - 1);
-      const T* row = samples.columns + samples.rows[at] * IsotropicColumns::count;
-      for (int k = 0; k < IsotropicColumns::count; ++k) plane_[k * w + l] = row[k];
+    constexpr int columns = IsotropicColumns::count;
+    const T* row[w];
+    for (int l = 0; l < w; ++l)
+      row[l] = samples.columns + samples.rows[std::min(first + l, samples.count - 1)] * columns;
+    if constexpr (w % 4 == 0) {
+      for (int l = 0; l < w; l += 4) {
+        for (int next = 0; next < columns; next += 4) {
+          const int k = std::min(next, columns - 4);
+          transpose4<T>({row[l] + k, row[l + 1] + k, row[l + 2] + k, row[l + 3] + k},
+                        plane_ + k * w + l, w);
+        }
+      }
+    } else {
+      for (int l = 0; l < w; ++l)
+        for (int k = 0; k < columns; ++k) plane_[k * w + l] = row[l][k];
     }
   }
 

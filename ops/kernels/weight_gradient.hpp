@@ -1,7 +1,7 @@
 #pragma once
 
-#include "ops/kernels/lanes.hpp"
 #include "ops/kernels/learned_law_table.hpp"
+#include "ops/kernels/transpose4.hpp"
 
 // The gradients of a layer's weight and bias over a tile: dL/dW += g xᵀ summed over the particles,
 // g [out, kTile] the gradient of what the layer gives, x [in, kTile] what it takes. With x turned
@@ -22,21 +22,10 @@ UNIPHY_INLINE T plane_sum(const T* plane) {
 /// Planes [padded(rows), kTile] → [kTile, stride], by squares of four.
 template <class T>
 inline void transpose_planes(int rows, const T* planes, std::ptrdiff_t stride, T* to) {
-  typedef T Four __attribute__((vector_size(4 * sizeof(T)), aligned(alignof(T)), may_alias));
   for (int r = 0; r < rows; r += 4) {
     for (std::ptrdiff_t l = 0; l < kTile; l += 4) {
-      Four from[4];
-      for (int k = 0; k < 4; ++k)
-        from[k] = *reinterpret_cast<const Four*>(planes + (r + k) * kTile + l);
-      const Four low01 = __builtin_shufflevector(from[0], from[1], 0, 4, 1, 5);
-      const Four low23 = __builtin_shufflevector(from[2], from[3], 0, 4, 1, 5);
-      const Four high01 = __builtin_shufflevector(from[0], from[1], 2, 6, 3, 7);
-      const Four high23 = __builtin_shufflevector(from[2], from[3], 2, 6, 3, 7);
-      const Four turned[4] = {__builtin_shufflevector(low01, low23, 0, 1, 4, 5),
-                              __builtin_shufflevector(low01, low23, 2, 3, 6, 7),
-                              __builtin_shufflevector(high01, high23, 0, 1, 4, 5),
-                              __builtin_shufflevector(high01, high23, 2, 3, 6, 7)};
-      for (int k = 0; k < 4; ++k) *reinterpret_cast<Four*>(to + (l + k) * stride + r) = turned[k];
+      const T* at = planes + r * kTile + l;
+      transpose4<T>({at, at + kTile, at + 2 * kTile, at + 3 * kTile}, to + l * stride + r, stride);
     }
   }
 }
