@@ -52,9 +52,7 @@ struct BenchReport {
   std::vector<const BenchRow*> all(const std::string& work, const std::string& pass) const;
 };
 
-/// Ratio of plain to our time for the value and the gradient together: what an optimizer's step
-/// pays. Forward alone would hide, and backward alone would charge, that the fused ops compute
-/// their activations again backwards where autograd keeps them.
+/// Ratio of plain to our time for the value and the gradient together, measured apart.
 double speedup_of_both(const BenchRow& forward, const BenchRow& backward);
 
 /// The row of work `name` of the measurer, whose calls handle `per_call` particles each.

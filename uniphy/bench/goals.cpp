@@ -25,7 +25,7 @@ void add_learned(const BenchReport& report, std::vector<Goal>& goals) {
     const BenchRow* backward = report.find("learned seed", "backward", forward->particles);
     share.add(forward->flops / forward->one / 1e9 / report.machine.fma_core);
     back.add(backward->one / forward->one);
-    speedup.add(speedup_of_both(*forward, *backward));
+    speedup.add(report.find("learned seed", "both", forward->particles)->speedup());
     for (const BenchRow* seed : {forward, backward}) {
       const BenchRow* isotropic = report.find("learned isotropic", seed->pass, seed->particles);
       over_seed.add(seed->one / isotropic->one);
