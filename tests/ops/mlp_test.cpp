@@ -63,6 +63,62 @@ TEST_P(MlpTest, GradientsAgreeWithCentralDifferences) {
   EXPECT_LE(errors.biases, 1e-8);
 }
 
+/// Lanes of floats have polynomials of their own for the activations.
+TEST_P(MlpTest, FloatsAreDoublesToRounding) {
+  const auto identity = [](torch::Dtype type) {
+    const LinearLayer layer{torch::ones({1, 1}, type), torch::zeros({1}, type)};
+    return std::vector<LinearLayer>{layer, layer};
+  };
+  const Tensor x = torch::cat({torch::linspace(-40, 40, 20001, torch::kFloat32),
+                               torch::logspace(-8, 4, 500, 10.0, torch::kFloat32),
+                               -torch::logspace(-8, 4, 500, 10.0, torch::kFloat32)})
+                       .unsqueeze(1)
+                       .requires_grad_();
+  const Tensor exact_x = x.detach().to(torch::kFloat64).requires_grad_();
+  const Tensor y = mlp(x, identity(torch::kFloat32), GetParam());
+  const Tensor exact = mlp_reference(exact_x, identity(torch::kFloat64), GetParam());
+  EXPECT_LE(((y - exact) / exact_x.abs().clamp_min(1)).abs().max().item<double>(), 3e-7);
+  const Tensor slope = torch::autograd::grad({y.sum()}, {x})[0];
+  const Tensor exact_slope = torch::autograd::grad({exact.sum()}, {exact_x})[0];
+  EXPECT_LE((slope - exact_slope).abs().max().item<double>(), 1.5e-6);
+}
+
+TEST_P(MlpTest, FlatLayersAreTheLayers) {
+  const auto l = network_layers({3 + 8, 20, 33, 5}, torch::kFloat64);
+  FlatLayers flat = flatten(l);
+  flat.numbers = flat.numbers.detach().requires_grad_();
+  const auto views = layers_of(flat);
+  ASSERT_EQ(views.size(), l.size());
+  const Tensor features = torch::randn({7, 64, 3}, torch::kFloat64).requires_grad_();
+  const Tensor z = torch::randn({7, 8}, torch::kFloat64).requires_grad_();
+  const Tensor seed = torch::randn({7, 64, 5}, torch::kFloat64);
+  const Tensor y = mlp(features, z, flat, GetParam());
+  EXPECT_TRUE(torch::equal(y, mlp(features, z, l, GetParam())));
+  const auto got = torch::autograd::grad({y}, {flat.numbers, features, z}, {seed});
+  const auto want = torch::autograd::grad({mlp(features, z, views, GetParam())},
+                                          {flat.numbers, features, z}, {seed});
+  for (std::size_t k = 0; k < got.size(); ++k) EXPECT_TRUE(torch::equal(got[k], want[k])) << k;
+  const PlainTensors plain;
+  EXPECT_LE((mlp(features, z, flat, GetParam()) - y).abs().max().item<double>(), 1e-12);
+}
+
+/// Whatever the order of memory, the same bits; what comes out has the order of what goes in.
+TEST_P(MlpTest, TakesSamplesInPlanes) {
+  const FlatLayers flat = flatten(network_layers({3 + 8, 20, 5}, torch::kFloat32));
+  const Tensor rows = torch::randn({7, 90, 3}), z = torch::randn({7, 8});
+  const Tensor planes = rows.transpose(1, 2).contiguous().transpose(1, 2);
+  const Tensor seed = torch::randn({7, 90, 5});
+  std::vector<Tensor> values, gradients;
+  for (const Tensor& features : {rows, planes}) {
+    const Tensor x = features.detach().requires_grad_();
+    values.push_back(mlp(x, z, flat, GetParam()));
+    EXPECT_EQ(values.back().stride(1) == 1, x.stride(1) == 1);
+    gradients.push_back(torch::autograd::grad({values.back()}, {x}, {seed})[0]);
+  }
+  EXPECT_TRUE(torch::equal(values[0], values[1]));
+  EXPECT_TRUE(torch::equal(gradients[0], gradients[1]));
+}
+
 TEST_P(MlpTest, PlainVersionStandsInWhileAskedFor) {
   const auto l = network_layers({11, 20, 5}, torch::kFloat32);
   const Tensor x = torch::randn({70, 11});
@@ -116,6 +172,26 @@ TEST(Mlp, RefusesWhatDoesNotFit) {
   EXPECT_THROW(mlp(torch::zeros({4}), l, kernels::Activation::silu), Error);
   EXPECT_THROW(mlp(torch::zeros({3, 4}, torch::kFloat64), l, kernels::Activation::silu), Error);
   EXPECT_THROW(mlp(torch::zeros({3, 4}), {}, kernels::Activation::silu), Error);
+  const FlatLayers flat = flatten(l);
+  const auto refused = [](const Tensor& features, const Tensor& z, const FlatLayers& layers) {
+    try {
+      mlp(features, z, layers, kernels::Activation::silu);
+    } catch (const Error& e) {
+      return std::string(e.what());
+    }
+    return std::string("nothing was refused");
+  };
+  const Tensor features = torch::zeros({3, 40, 2}), z = torch::zeros({3, 2});
+  EXPECT_NE(refused(features, torch::zeros({3, 3}), flat)
+                .find("the first of which takes 5 numbers, found 4"),
+            std::string::npos);
+  EXPECT_NE(refused(features, z, {flat.numbers.narrow(0, 1, 57), flat.widths})
+                .find("expected [58] numbers of type Float, found Float [57]"),
+            std::string::npos);
+  EXPECT_NE(refused(features, z, {flat.numbers.to(torch::kFloat64), flat.widths})
+                .find("expected [58] numbers of type Float, found Double [58]"),
+            std::string::npos);
+  EXPECT_NE(refused(features, z, {flat.numbers, {}}).find("found none"), std::string::npos);
 }
 
 TEST(Mlp, UndefinedGradientsStayUndefined) {
