@@ -30,6 +30,7 @@ Chart roofline(const BenchReport& report) {
   // One series for each kind of work, its passes and sizes as points.
   for (const BenchRow& row : report.rows) {
     if (!std::isfinite(row.flops) || !std::isfinite(row.bytes) || row.work == "svd3 f64") continue;
+    if (row.pass == "both") continue;  // its passes are there
     const std::string label = row.work + ", " + row.pass;
     auto at = std::find_if(chart.series.begin(), chart.series.end(),
                            [&](const Series& s) { return s.label == label; });

@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include "uniphy/report/interrupt.hpp"
@@ -124,7 +125,8 @@ Tensor fit_latents(const Dataset& data, const Networks& trained, const Tensor& t
       scores[k] = loss_of(training_z[k].unsqueeze(0).expand({n, -1}), rows, of);
   }
   const Tensor best = std::get<1>(scores.topk(starts, 0, /*largest=*/false));  // [starts, n]
-  Tensor z = training_z.detach().index_select(0, best.reshape({-1})).clone().requires_grad_();
+  const Tensor initial = training_z.detach().index_select(0, best.reshape({-1}));
+  Tensor z = initial.clone().requires_grad_();
   const Tensor of = torch::arange(n).repeat({starts});
   torch::optim::Adam optimizer({z}, torch::optim::AdamOptions(o.learning_rate).betas({0.9, 0.99}));
   Progress progress("fit latents", o.steps, "steps");
@@ -141,10 +143,15 @@ Tensor fit_latents(const Dataset& data, const Networks& trained, const Tensor& t
   }
   progress.finish();
   torch::NoGradGuard no_grad;
+  // Some starts lead astray, to scales at which nothing is finite any more; the training code that
+  // answers best is finite.
+  const Tensor fitted = torch::cat({z.detach(), initial.narrow(0, 0, n)});
   const Tensor final_scores =
-      loss_of(z, sampler.rows(-2, 256).repeat({starts, 1}), of, ReturnStage::actual);
-  const Tensor winner = final_scores.view({starts, n}).argmin(0);  // [n]
-  return z.detach().index_select(0, winner * n + torch::arange(n));
+      loss_of(fitted, sampler.rows(-2, 256).repeat({starts + 1, 1}),
+              torch::arange(n).repeat({starts + 1}), ReturnStage::actual)
+          .nan_to_num(std::numeric_limits<double>::infinity());
+  const Tensor winner = final_scores.view({starts + 1, n}).argmin(0);  // [n]
+  return fitted.index_select(0, winner * n + torch::arange(n));
 }
 
 ModelFile model_file(const Networks& networks, const Tensor& z, const Dataset& data,

@@ -293,6 +293,12 @@ TEST_F(TrainingTest, FindsTheCodeOfKnownSamples) {
   const auto trained = errors_of(result.z), fitted = errors_of(z);
   for (std::size_t i = 0; i < trained.size(); ++i)
     EXPECT_LE(fitted[i].stress, 2 * trained[i].stress + 0.02) << data.trajectories[i].material;
+
+  // Where every start is led astray, a training code answers.
+  fit.learning_rate = 1e4;
+  const Tensor kept = fit_latents(data, result.networks, result.z, fit);
+  for (std::int64_t i = 0; i < kept.size(0); ++i)
+    EXPECT_TRUE((result.z.detach() == kept[i]).all(1).any().item<bool>()) << i;
 }
 
 }  // namespace
