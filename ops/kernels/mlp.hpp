@@ -45,15 +45,16 @@ inline void tile_linear(int rows, int cols, const T* packed, const T* bias, cons
       for (int o = 0; o < kOutputBlock; ++o)
         for (int g = 0; g < kGroup; ++g)
           sum[o][g].store_aligned(out + std::ptrdiff_t(r + o) * kTile + l + g * w);
-      if constexpr (std::is_same_v<Finish, AsIs<T>>) continue;
+      if constexpr (!std::is_same_v<Finish, AsIs<T>>) {
         // A loop, and no work on the sums themselves: with all of them in registers there is no
         // room for what an activation needs.
 #pragma GCC unroll 1
-      for (int o = 0; o < kOutputBlock; ++o) {
+        for (int o = 0; o < kOutputBlock; ++o) {
 #pragma GCC unroll 4
-        for (int g = 0; g < kGroup; ++g) {
-          const std::ptrdiff_t at = std::ptrdiff_t(r + o) * kTile + l + g * w;
-          finish(V::load_aligned(out + at), at).store_aligned(out + at);
+          for (int g = 0; g < kGroup; ++g) {
+            const std::ptrdiff_t at = std::ptrdiff_t(r + o) * kTile + l + g * w;
+            finish(V::load_aligned(out + at), at).store_aligned(out + at);
+          }
         }
       }
     }
@@ -85,7 +86,7 @@ UNIPHY_NOINLINE void hidden_layer(const PackedLayer<T>& layer, const T* in, T* o
   tile_linear(layer.out, layer.in, layer.forward, layer.bias, in, out,
               Activated<A, keep, T>{slope});
 }
-/// Layer k, its activation included; slope may be null.
+/// Layer k, its activation included; `slope` is written with `keep`.
 template <bool keep, class T>
 inline void layer_forward(const PackedMlp<T>& net, int k, const T* in, T* out, T* slope) {
   const PackedLayer<T>& layer = net.layer[k];
