@@ -54,11 +54,12 @@ UNIPHY_INLINE ProjectionErrors<V> projection_errors(const IsotropicAnswers<T>& a
   p.partial = of_norm(p.cap.share);
   p.whole = of_norm(one);
   p.above = select<V>(p.cuts, lane_max(zero, p.cap_q - norm + norm_decrease), zero);
-  p.of_fluid =
-      select<V>(p.to_zero && !p.cuts_trace,
-                V(T(kFluidWeight)) * norm * lane_max(zero, p.cap.c1 - V(T(2 * kFluidCap))), zero);
+  const auto fluid = p.to_zero && !p.cuts_trace;
+  p.of_fluid = select<V>(
+      fluid, V(T(kFluidWeight)) * norm * lane_max(zero, p.cap.c1 - V(T(2 * kFluidCap))), zero);
+  const V t = p.trial.trace, least_cap = select<V>(fluid, t + lane_max(zero, t), t);
   p.of_trace = select<V>(p.cuts_trace, p.cap_t - sample[Column::projected_trace],
-                         lane_max(zero, p.trial.trace - p.cap_t));
+                         lane_max(zero, least_cap - p.cap_t));
   const V decrease2 = fma(norm_decrease, norm_decrease, trace_decrease * trace_decrease * third);
   p.inverse_size2 = one / (decrease2 + V(a.strain_floor2 + T(kLeastSize2)));
   const V others =

@@ -21,7 +21,9 @@
 //                                     higher than what a sample that yields comes down to; without
 //                                     it a share near 0 would hide a cap that is far too high
 //        + (0.1 q (c₁ + 1)₊)²         a fluid, whose cap is to lie below kFluidCap with some room
-//        + ⅓ (T − t')² or ⅓ (t − T)₊² the trace, cut to t' or left alone
+//        + ⅓ (T − t')² or ⅓ (t − T)₊² the trace, cut to t' or left alone; a fluid's cap is to lie
+//                                     beyond t + t₊, since the few samples that expand most weigh
+//                                     too little to keep it beyond t
 // "Whole" is a(1) in place of a(r): a law that returns the whole way to the cap.
 
 namespace uniphy::kernels {

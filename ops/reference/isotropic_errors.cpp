@@ -95,11 +95,12 @@ ProjectionErrors projection_errors(const Tensor& batch, const Tensor& scales, co
       torch::where((norm_kind > 0.5) & (norm_kind < 1.5), torch::relu(cap_q - norm + norm_decrease),
                    torch::zeros_like(norm));
   // A fluid's cap is to lie below kFluidCap, with some room.
-  const Tensor of_fluid =
-      torch::where((norm_kind > 1.5) & ~trace_cut,
-                   0.1 * norm * torch::relu(c1 - 2 * kernels::kFluidCap), torch::zeros_like(norm));
+  const Tensor fluid = (norm_kind > 1.5) & ~trace_cut;
+  const Tensor of_fluid = torch::where(fluid, 0.1 * norm * torch::relu(c1 - 2 * kernels::kFluidCap),
+                                       torch::zeros_like(norm));
+  const Tensor least_cap = torch::where(fluid, trace + torch::relu(trace), trace);
   const Tensor of_trace =
-      torch::where(trace_cut, cap_t - projected_trace, torch::relu(trace - cap_t));
+      torch::where(trace_cut, cap_t - projected_trace, torch::relu(least_cap - cap_t));
   const Tensor decrease2 = square(norm_decrease) + square(trace_decrease) / 3.0;
   const Tensor strain_rms = scales.select(1, 1).unsqueeze(1);
   const Tensor decrease_rms = scales.select(1, 2).unsqueeze(1);
