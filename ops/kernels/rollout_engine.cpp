@@ -31,8 +31,8 @@ RolloutEngine<T>::RolloutEngine(const Rollout<T>& rollout)
       order_(ranges_of(rollout)),
       mass_(chunks() * std::ptrdiff_t(kChunk)),
       volume_(chunks() * std::ptrdiff_t(kChunk)),
-      states_(chunks() * std::ptrdiff_t(kStateChunkSize)),
-      transfer_(chunks()),
+      states_(chunks() * std::ptrdiff_t(kStateChunkSize), Pages::huge),
+      transfer_(chunks(), Pages::huge),
       grid_nodes_(grid_size(rollout.grid().n)),
       accumulator_(order_.bodies()) {
   transfer_.fill(TransferChunk<T>{});

@@ -86,7 +86,8 @@ class RolloutEngine {
   AlignedBuffer<T> mass_, volume_;  ///< [chunks][kChunk]
   AlignedBuffer<T> states_;         ///< [steps + 1 or 1][chunks][kStatePlanes][kChunk]
   std::ptrdiff_t state_stride_ = 0;
-  AlignedBuffer<T> stresses_, F_trials_;  ///< [steps][chunks][9][kChunk], where kept
+  AlignedBuffer<T> stresses_{0, Pages::huge},
+      F_trials_;  ///< [steps][chunks][9][kChunk], where kept
   bool keep_history_ = false, keep_F_trial_ = false;
   AlignedBuffer<TransferChunk<T>> transfer_;
   AlignedBuffer<T> grid_nodes_, grad_nodes_;
@@ -94,8 +95,8 @@ class RolloutEngine {
   std::vector<GridRecord<T>> records_;
   std::ptrdiff_t kept_steps_ = 0;
 
-  AlignedBuffer<T> grads_;         ///< [chunks][kStatePlanes][kChunk]
-  AlignedBuffer<T> accumulators_;  ///< of chunk c from accumulator_start_[c] on
+  AlignedBuffer<T> grads_{0, Pages::huge};  ///< [chunks][kStatePlanes][kChunk]
+  AlignedBuffer<T> accumulators_;           ///< of chunk c from accumulator_start_[c] on
   std::vector<std::ptrdiff_t> accumulator_start_;
   std::vector<std::vector<double>> accumulator_;
 };

@@ -86,7 +86,8 @@ bool plot_chart(const std::filesystem::path& png, const Chart& chart) {
       "set border 3 lc rgb '#444444'\nset tics nomirror\n"
       "set grid lc rgb '#dddddd' lt 1 lw 0.5\n";
   // Points may lie anywhere; a line that passes under the legend shows on both sides of it.
-  script += scattered ? "set key outside right top\n" : "set key opaque\n";
+  // Without room on the right the last label of the axis is cut.
+  script += scattered ? "set key outside right top\n" : "set key opaque\nset rmargin 6\n";
   if (chart.log_x) script += "set logscale x\nset format x '10^{%T}'\n";
   if (chart.log_y) script += "set logscale y\nset format y '10^{%T}'\n";
   if (coloured) {
