@@ -121,8 +121,9 @@ void bench_size(const BenchOptions& options, kernels::LawForm form, std::int64_t
     ours.forward();
     ours.backward();
   });
-  measurer.add_baseline(
-      "both", [&] { torch::autograd::grad(run_plain(), {F, C, z}, grad, /*retain_graph=*/false); });
+  measurer.add_baseline("both", [&] {
+    torch::autograd::grad(run_plain(), {F, C, z}, grad, /*retain_graph=*/false);
+  });
   measurer.run(options.effort);
 
   const double flops = 2 * multiply_adds_of(*weights);

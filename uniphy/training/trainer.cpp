@@ -146,10 +146,9 @@ Tensor fit_latents(const Dataset& data, const Networks& trained, const Tensor& t
   // Some starts lead astray, to scales at which nothing is finite any more; the training code that
   // answers best is finite.
   const Tensor fitted = torch::cat({z.detach(), initial.narrow(0, 0, n)});
-  const Tensor final_scores =
-      loss_of(fitted, sampler.rows(-2, 256).repeat({starts + 1, 1}),
-              torch::arange(n).repeat({starts + 1}), ReturnStage::actual)
-          .nan_to_num(std::numeric_limits<double>::infinity());
+  const Tensor final_scores = loss_of(fitted, sampler.rows(-2, 256).repeat({starts + 1, 1}),
+                                      torch::arange(n).repeat({starts + 1}), ReturnStage::actual)
+                                  .nan_to_num(std::numeric_limits<double>::infinity());
   const Tensor winner = final_scores.view({starts + 1, n}).argmin(0);  // [n]
   return fitted.index_select(0, winner * n + torch::arange(n));
 }
