@@ -4,14 +4,13 @@
 #include "ops/kernels/learned_law_weights.hpp"
 
 // The activations of the learned networks, one particle a lane. They are a third of the time of a
-// narrow network, so the exponential of silu does without the checks of a general one.
+// narrow network, so their exponential does without the checks of a general one.
 
 namespace uniphy::kernels {
 inline namespace UNIPHY_ISA {
 
 /// c^x, given log₂ c: 2^(n + r), n an integer, with the polynomial in r of least largest relative
-/// error, 9e-8, on [−½, ½]. For |x log₂ c| ≤ 120; n takes part of x's own rounding to the result,
-/// as any exponential does.
+/// error, 9e-8, on [−½, ½]. For |x log₂ c| ≤ 120; the rounding of log₂ c counts |x| times.
 template <class V>
 UNIPHY_INLINE V bounded_power(const V& x, const V& log2_of_base) {
   const V n = xsimd::nearbyint(x * log2_of_base);
