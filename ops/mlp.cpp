@@ -270,6 +270,7 @@ std::vector<LinearLayer> layers_of(const FlatLayers& flat) {
 }
 
 FlatLayers flatten(const std::vector<LinearLayer>& layers) {
+  if (layers.empty()) throw Error("flatten: expected at least one layer");
   variable_list tensors;
   std::vector<std::int64_t> widths{layers.front().weight.size(1)};
   for (const LinearLayer& layer : layers) {

@@ -24,7 +24,7 @@ struct FlatLayers {
 };
 /// Views of the numbers; gradients go through.
 std::vector<LinearLayer> layers_of(const FlatLayers& flat);
-/// A copy; gradients go through.
+/// A copy; gradients go through. Throws Error where there is no layer.
 FlatLayers flatten(const std::vector<LinearLayer>& layers);
 
 /// A multilayer perceptron as one op: x [S, in] → [S, out], differentiable by x and by every weight

@@ -13,8 +13,8 @@
 namespace uniphy::kernels {
 
 /// Whether a large buffer asks for pages of 2 MiB: where all of it is walked over again and again,
-/// as the particles are, misses of the TLB are a tenth of the time; where only parts are touched,
-/// as of a grid, small pages keep the rest out of memory.
+/// as the particles are, misses of the TLB are up to a tenth of the time; where only parts are
+/// touched, as of a grid, small pages keep the rest out of memory.
 enum class Pages { small, huge };
 
 /// Memory aligned for the widest vectors, left uninitialised, so that pages of a large grid that

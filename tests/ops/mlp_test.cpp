@@ -172,6 +172,7 @@ TEST(Mlp, RefusesWhatDoesNotFit) {
   EXPECT_THROW(mlp(torch::zeros({4}), l, kernels::Activation::silu), Error);
   EXPECT_THROW(mlp(torch::zeros({3, 4}, torch::kFloat64), l, kernels::Activation::silu), Error);
   EXPECT_THROW(mlp(torch::zeros({3, 4}), {}, kernels::Activation::silu), Error);
+  EXPECT_THROW(flatten({}), Error);
   const FlatLayers flat = flatten(l);
   const auto refused = [](const Tensor& features, const Tensor& z, const FlatLayers& layers) {
     try {

@@ -51,7 +51,7 @@ void apply(const ThreadSetting& setting) {
   // time, which spin for some 20 ms and take a processor from what is measured.
   omp_set_num_threads(setting.threads);
   if (auto* set = openblas<void(int)>("openblas_set_num_threads")) set(setting.blas_threads);
-  // The threads of OpenBLAS wait awake for some 26 ms; what comes next shall not share with them.
+  // The threads of OpenBLAS stay awake for a while; what comes next shall not share with them.
   static bool blas_awake = false;
   if (blas_awake) std::this_thread::sleep_for(std::chrono::milliseconds(40));
   blas_awake = setting.blas_threads > 1;
