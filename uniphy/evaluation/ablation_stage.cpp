@@ -12,15 +12,13 @@
 #include "uniphy/evaluation/ablation_report.hpp"
 #include "uniphy/evaluation/law_cost.hpp"
 #include "uniphy/evaluation/rollout_error.hpp"
+#include "uniphy/evaluation/step_budget.hpp"
 #include "uniphy/io/atomic_file.hpp"
 #include "uniphy/training/heldout_fit.hpp"
 #include "uniphy/training/training_report.hpp"
 
 namespace uniphy {
 namespace {
-
-/// The trial that a budget of seconds is turned into steps by.
-constexpr std::int64_t kTrialSteps = 40;
 
 struct HeldoutSet {
   Dataset data;
@@ -44,8 +42,8 @@ HeldoutSet heldout_set(const AblationOptions& o, const RunDirectory& out) {
   return set;
 }
 
-/// Steps that fit in the seconds, measured once and kept: an interrupted training must go on with
-/// the number that it began with.
+/// steps_within, measured once and kept: an interrupted training must go on with the number that it
+/// began with.
 std::int64_t steps_for(double seconds, const Dataset& data, const TrainingOptions& training,
                        const RunDirectory& out) {
   const std::filesystem::path file = out.file("steps.txt");
@@ -62,10 +60,7 @@ std::int64_t steps_for(double seconds, const Dataset& data, const TrainingOption
     std::filesystem::remove(scratch);  // of a trial that was interrupted
     return train(data, trial, scratch).seconds;
   };
-  // The difference is free of what every training does once.
-  const double few = taken(kTrialSteps / 4), many = taken(kTrialSteps);
-  const double step = std::max(1e-6, (many - few) / (0.75 * kTrialSteps));
-  const auto steps = std::max<std::int64_t>(1, std::llround((seconds - few) / step));
+  const std::int64_t steps = steps_within(seconds, taken);
   write_text_file(file, std::to_string(steps));
   return steps;
 }
