@@ -6,10 +6,10 @@
 namespace uniphy {
 
 /// How many steps of a training fit in `seconds` (s), at least one. `taken(n)` trains n steps from
-/// the start and returns how long that took, in s. Trials grow until one has taken a twentieth
-/// of the budget, and the result is that trial's own pace: what every training does once counts as
-/// if it were done again and again, and a trial that was disturbed gives too few steps. Never the
-/// difference of two trials, which noise can bring to nothing, and the steps to any number.
+/// the start and returns how long that took, in s. Trials grow until one has taken a twentieth of
+/// the budget; a step costs what that trial took, less what the shortest trial took, of which at
+/// most half of the longest is believed. So a disturbed trial makes at most twice too many steps,
+/// where the bare difference of two trials could be nothing, and the steps any number.
 std::int64_t steps_within(double seconds, const std::function<double(std::int64_t)>& taken);
 
 }  // namespace uniphy

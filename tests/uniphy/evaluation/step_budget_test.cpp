@@ -14,7 +14,7 @@ TEST(StepsWithin, FitTheBudgetAndUseMostOfIt) {
     for (const double step : {1e-5, 1e-3, 0.2}) {
       const auto taken = [&](std::int64_t steps) { return once + step * double(steps); };
       const double whole = taken(steps_within(60, taken));
-      EXPECT_LE(whole, 60.1) << once << " " << step;
+      EXPECT_LE(whole, 63) << once << " " << step;
       EXPECT_GE(whole, 54) << once << " " << step;
     }
   }
@@ -36,10 +36,10 @@ TEST(StepsWithin, AreAtLeastOne) {
 
 // The first trial pays for what the process does once, and the next ones look as if their further
 // steps had cost nothing.
-TEST(StepsWithin, ADisturbedTrialGivesTooFewAndNeverTooMany) {
+TEST(StepsWithin, ADisturbedTrialMakesAtMostTwiceTooMany) {
   constexpr double kStep = 1e-3;
   for (const std::vector<double>& delays :
-       {std::vector<double>{5, 0, 0}, {0.02, 0.01, 0}, {0, 5, 0}, {0, 0, 0.5}}) {
+       {std::vector<double>{5, 5, 0}, {5, 0, 0}, {0.05, 0.04, 0}, {0, 5, 0}, {0, 0, 0.5}}) {
     std::size_t call = 0;
     const std::int64_t steps = steps_within(1, [&](std::int64_t n) {
       const double delay = call < delays.size() ? delays[call] : 0;
@@ -47,7 +47,7 @@ TEST(StepsWithin, ADisturbedTrialGivesTooFewAndNeverTooMany) {
       return delay + kStep * double(n);
     });
     EXPECT_GE(steps, 1);
-    EXPECT_LE(steps, 1000);
+    EXPECT_LE(steps, 2000);
   }
 }
 
