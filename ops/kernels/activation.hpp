@@ -14,13 +14,13 @@ inline namespace UNIPHY_ISA {
 template <class V>
 UNIPHY_INLINE V bounded_power(const V& x, const V& log2_of_base) {
   const V n = xsimd::nearbyint(x * log2_of_base);
-  const V r = fma(x, log2_of_base, -n);
+  const V r = lane_fma(x, log2_of_base, -n);
   V p(1.32647256236e-3F);
-  p = fma(p, r, V(9.67151309290e-3F));
-  p = fma(p, r, V(5.55073375169e-2F));
-  p = fma(p, r, V(0.240222420776F));
-  p = fma(p, r, V(0.693146977592F));
-  p = fma(p, r, V(1.0F));
+  p = lane_fma(p, r, V(9.67151309290e-3F));
+  p = lane_fma(p, r, V(5.55073375169e-2F));
+  p = lane_fma(p, r, V(0.240222420776F));
+  p = lane_fma(p, r, V(0.693146977592F));
+  p = lane_fma(p, r, V(1.0F));
   return xsimd::ldexp(p, xsimd::to_int(n));
 }
 /// e^x for |x| ≤ 80.
@@ -41,20 +41,20 @@ template <class V>
 UNIPHY_INLINE V gelu_lanes(const V& x, V* slope) {
   const V within = lane_max(V(-6.0F), lane_min(V(6.0F), x)), square = within * within;
   V p(2.0153884673e-8F), q(1.1330968479e-6F);
-  p = fma(p, square, V(6.5132488028e-6F));
-  q = fma(q, square, V(8.3075380003e-5F));
-  p = fma(p, square, V(1.9913140766e-4F));
-  q = fma(q, square, V(2.0573727601e-3F));
-  p = fma(p, square, V(4.8628185747e-3F));
-  q = fma(q, square, V(3.0376600194e-2F));
-  p = fma(p, square, V(3.6876552903e-2F));
-  q = fma(q, square, V(0.25910027601F));
-  p = fma(p, square, V(0.39894214026F));
-  q = fma(q, square, V(1.0F));
-  const V phi = fma(within, p / q, V(0.5F));
+  p = lane_fma(p, square, V(6.5132488028e-6F));
+  q = lane_fma(q, square, V(8.3075380003e-5F));
+  p = lane_fma(p, square, V(1.9913140766e-4F));
+  q = lane_fma(q, square, V(2.0573727601e-3F));
+  p = lane_fma(p, square, V(4.8628185747e-3F));
+  q = lane_fma(q, square, V(3.0376600194e-2F));
+  p = lane_fma(p, square, V(3.6876552903e-2F));
+  q = lane_fma(q, square, V(0.25910027601F));
+  p = lane_fma(p, square, V(0.39894214026F));
+  q = lane_fma(q, square, V(1.0F));
+  const V phi = lane_fma(within, p / q, V(0.5F));
   if (slope) {
     const V density = V(0.39894228F) * bounded_power(square, V(-0.72134752F));
-    *slope = fma(within, density, phi);
+    *slope = lane_fma(within, density, phi);
   }
   return x * phi;
 }
@@ -67,19 +67,20 @@ UNIPHY_INLINE V activate(const V& x, V* slope) {
   if constexpr (A == Activation::gelu && !is_scalar_lane<V> && sizeof(T) == sizeof(float)) {
     return gelu_lanes(x, slope);
   } else if constexpr (A == Activation::gelu) {
-    const V phi = fma(half, lane_erf(x * V(T(0.70710678118654752440))), half);
-    if (slope) *slope = fma(x * V(T(0.39894228040143267794)), lane_exp(x * x * V(T(-0.5))), phi);
+    const V phi = lane_fma(half, lane_erf(x * V(T(0.70710678118654752440))), half);
+    if (slope)
+      *slope = lane_fma(x * V(T(0.39894228040143267794)), lane_exp(x * x * V(T(-0.5))), phi);
     return x * phi;
   } else if constexpr (A == Activation::silu) {
     // Bounded so that the exponential stays finite; sigma is 0 or 1 to rounding there.
     const V within = lane_max(V(T(-80)), lane_min(V(T(80)), x));
     const V sigma = one / (one + bounded_exp(-within));
-    if (slope) *slope = sigma * fma(x, one - sigma, one);
+    if (slope) *slope = sigma * lane_fma(x, one - sigma, one);
     return x * sigma;
   } else {
-    const V root = lane_sqrt(fma(x, x, V(T(4))));
-    if (slope) *slope = fma(half, x / root, half);
-    return fma(half, x + root, V(T(-1)));
+    const V root = lane_sqrt(lane_fma(x, x, V(T(4))));
+    if (slope) *slope = lane_fma(half, x / root, half);
+    return lane_fma(half, x + root, V(T(-1)));
   }
 }
 

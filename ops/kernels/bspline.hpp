@@ -38,7 +38,8 @@ UNIPHY_INLINE NodeRow<T> row_index() {
 template <class T>
 UNIPHY_INLINE NodeRow<T> row_weights(T f) {
   const NodeRow<T> d = f - NodeRow<T>::load(BSplineTable<T>::c);
-  return fma(NodeRow<T>::load(BSplineTable<T>::s), d * d, NodeRow<T>::load(BSplineTable<T>::t));
+  return lane_fma(NodeRow<T>::load(BSplineTable<T>::s), d * d,
+                  NodeRow<T>::load(BSplineTable<T>::t));
 }
 
 /// Their derivatives by f.

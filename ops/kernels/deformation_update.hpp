@@ -20,8 +20,8 @@ void deformation_update(const T* state, int count, const StepConstants<T>& const
       V C[3];
       for (int c = 0; c < 3; ++c) C[c] = load_plane<V>(state, kPlaneC + 3 * a + c, l);
       for (int b = 0; b < 3; ++b) {
-        const V CF = fma(C[0], F[b], fma(C[1], F[3 + b], C[2] * F[6 + b]));
-        store_plane<V>(F_trial, 3 * a + b, l, fma(dt, CF, F[3 * a + b]));
+        const V CF = lane_fma(C[0], F[b], lane_fma(C[1], F[3 + b], C[2] * F[6 + b]));
+        store_plane<V>(F_trial, 3 * a + b, l, lane_fma(dt, CF, F[3 * a + b]));
       }
     }
   }
@@ -42,11 +42,12 @@ void deformation_update_adjoint(const T* state, int count, const StepConstants<T
     }
     for (int a = 0; a < 3; ++a) {
       for (int b = 0; b < 3; ++b) {
-        const V CtG = fma(C[a], G[b], fma(C[3 + a], G[3 + b], C[6 + a] * G[6 + b]));
-        store_plane<V>(grad_F, 3 * a + b, l, fma(dt, CtG, G[3 * a + b]));
-        const V GFt =
-            fma(G[3 * a], F[3 * b], fma(G[3 * a + 1], F[3 * b + 1], G[3 * a + 2] * F[3 * b + 2]));
-        store_plane<V>(grad_C, 3 * a + b, l, fma(dt, GFt, load_plane<V>(grad_C, 3 * a + b, l)));
+        const V CtG = lane_fma(C[a], G[b], lane_fma(C[3 + a], G[3 + b], C[6 + a] * G[6 + b]));
+        store_plane<V>(grad_F, 3 * a + b, l, lane_fma(dt, CtG, G[3 * a + b]));
+        const V GFt = lane_fma(G[3 * a], F[3 * b],
+                               lane_fma(G[3 * a + 1], F[3 * b + 1], G[3 * a + 2] * F[3 * b + 2]));
+        store_plane<V>(grad_C, 3 * a + b, l,
+                       lane_fma(dt, GFt, load_plane<V>(grad_C, 3 * a + b, l)));
       }
     }
   }

@@ -22,9 +22,9 @@ struct DruckerPrager {
   static UNIPHY_INLINE ReturnMap<V> map(const HenckyStrain<V>& h, const Material<V>& m) {
     using T = ScalarOf<V>;
     const V zero(T(0)), one(T(1)), three(T(3)), two_mu = m.mu + m.mu;
-    const V beta = alpha(m) * fma(three, m.lambda, two_mu) / two_mu;
+    const V beta = alpha(m) * lane_fma(three, m.lambda, two_mu) / two_mu;
     const MaskOf<V> tension = h.trace > zero;
-    const MaskOf<V> slides = fma(beta, h.trace, h.norm) > zero;
+    const MaskOf<V> slides = lane_fma(beta, h.trace, h.norm) > zero;
     ReturnMap<V> r;
     r.yields = tension || slides;
     const V norm = select<V>(h.norm > zero, h.norm, one);
@@ -39,7 +39,8 @@ struct DruckerPrager {
                                     StrainGradient<V>& strain, MaterialGradient<V>& g) {
     using T = ScalarOf<V>;
     const V zero(T(0)), one(T(1)), three(T(3)), two_mu = m.mu + m.mu;
-    const V a = alpha(m), stiffness = fma(three, m.lambda, two_mu) / two_mu, beta = a * stiffness;
+    const V a = alpha(m), stiffness = lane_fma(three, m.lambda, two_mu) / two_mu,
+            beta = a * stiffness;
     // Nothing depends on the strain at the tip of the cone.
     const MaskOf<V> cone = r.yields && !(h.trace > zero);
     const V per_q = select<V>(cone, grad_scale / select<V>(h.norm > zero, h.norm, one), zero);

@@ -19,7 +19,8 @@ struct FixedCorotated {
     const V J = s.sigma[0] * s.sigma[1] * s.sigma[2];
     const V pressure = m.lambda * J * (J - one);
     Vec3<V> t;
-    for (int i = 0; i < 3; ++i) t[i] = fma(two * m.mu * s.sigma[i], s.sigma[i] - one, pressure);
+    for (int i = 0; i < 3; ++i)
+      t[i] = lane_fma(two * m.mu * s.sigma[i], s.sigma[i] - one, pressure);
     return compose(s.U, t, s.U);
   }
 
@@ -41,8 +42,9 @@ struct FixedCorotated {
     V of_mu(T(0));
     for (int i = 0; i < 3; ++i) {
       const int j = (i + 1) % 3, k = (i + 2) % 3;
-      B(i, i) = fma(two * m.mu * S(i, i), sigma[i] + sigma[i] - one, slope_J * sigma[j] * sigma[k]);
-      of_mu = fma(S(i, i) * sigma[i], sigma[i] - one, of_mu);
+      B(i, i) =
+          lane_fma(two * m.mu * S(i, i), sigma[i] + sigma[i] - one, slope_J * sigma[j] * sigma[k]);
+      of_mu = lane_fma(S(i, i) * sigma[i], sigma[i] - one, of_mu);
     }
     for (int k = 0; k < 3; ++k)
       divided[k] = two * m.mu * (sigma[kPair[k][0]] + sigma[kPair[k][1]] - one);

@@ -28,10 +28,10 @@ void gather(const TransferChunk<T>& chunk, const GridView<const T>& grid, T* mom
       const Row row0 = Row::load(layer), row1 = Row::load(layer + row_stride),
                 row2 = Row::load(layer + 2 * row_stride);
       const Row part1 = wy[1] * row1, part2 = wy[2] * row2;
-      const Row along_y = fma(wy[0], row0, part1 + part2);
-      sum = fma(wx[i], along_y, sum);
-      if (i > 0) sum_x = fma(T(i) * wx[i], along_y, sum_x);
-      sum_y = fma(wx[i], fma(T(2), part2, part1), sum_y);
+      const Row along_y = lane_fma(wy[0], row0, part1 + part2);
+      sum = lane_fma(wx[i], along_y, sum);
+      if (i > 0) sum_x = lane_fma(T(i) * wx[i], along_y, sum_x);
+      sum_y = lane_fma(wx[i], lane_fma(T(2), part2, part1), sum_y);
     }
     T out[4][4];
     sum = sum * wz;
@@ -55,7 +55,8 @@ void g2p_finish(const TransferChunk<T>& chunk, const T* moments, const T* state,
     for (int c = 0; c < 3; ++c) {
       const V v = load_plane<V>(moments, c, l);
       store_plane<V>(state_out, kPlaneV + c, l, v);
-      store_plane<V>(state_out, kPlaneX + c, l, fma(dt, v, load_plane<V>(state, kPlaneX + c, l)));
+      store_plane<V>(state_out, kPlaneX + c, l,
+                     lane_fma(dt, v, load_plane<V>(state, kPlaneX + c, l)));
       for (int b = 0; b < 3; ++b) {
         const V f = load_plane<V>(chunk.f[0], b, l);
         store_plane<V>(state_out, kPlaneC + 3 * c + b, l,

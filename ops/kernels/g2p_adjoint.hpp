@@ -20,7 +20,7 @@ void g2p_adjoint_records(const T* grad, const StepConstants<T>& constants,
   for (int l = 0; l < chunk->count; l += width_of<V>) {
     V q[3], a[9];
     for (int c = 0; c < 3; ++c) {
-      q[c] = fma(dt, load_plane<V>(grad, kPlaneX + c, l), load_plane<V>(grad, kPlaneV + c, l));
+      q[c] = lane_fma(dt, load_plane<V>(grad, kPlaneX + c, l), load_plane<V>(grad, kPlaneV + c, l));
     }
     for (int k = 0; k < 9; ++k) a[k] = factor * load_plane<V>(grad, kPlaneC + k, l);
     store_records(chunk, l, q, a, V(T(0)));
@@ -44,7 +44,7 @@ void g2p_adjoint_finish(const TransferChunk<T>& chunk, const T* moments, const T
       }
       const V g_f = load_plane<V>(moments, 16 + b, l) - factor * through_offset;
       const int k = kPlaneX + b;
-      store_plane<V>(grad, k, l, fma(g_f, inv_dx, load_plane<V>(grad, k, l)));
+      store_plane<V>(grad, k, l, lane_fma(g_f, inv_dx, load_plane<V>(grad, k, l)));
     }
   }
 }

@@ -25,7 +25,7 @@ UNIPHY_INLINE Mat3<V> hencky_stress(const Mat3<V>& U, const Vec3<V>& eps, const 
                                     const Material<V>& m) {
   const V two_mu = m.mu + m.mu, pressure = m.lambda * trace;
   Vec3<V> t;
-  for (int i = 0; i < 3; ++i) t[i] = fma(two_mu, eps[i], pressure);
+  for (int i = 0; i < 3; ++i) t[i] = lane_fma(two_mu, eps[i], pressure);
   return compose(U, t, U);
 }
 
@@ -39,8 +39,8 @@ UNIPHY_INLINE Mat3<V> hencky_adjoint(const StressState<V>& state, const Mat3<V>&
   Vec3<V> divided;
   V of_mu(T(0));
   for (int i = 0; i < 3; ++i) {
-    B(i, i) = fma(two_mu, S(i, i), of_trace) * state.slope[i];
-    of_mu = fma(S(i, i), state.eps[i], of_mu);
+    B(i, i) = lane_fma(two_mu, S(i, i), of_trace) * state.slope[i];
+    of_mu = lane_fma(S(i, i), state.eps[i], of_mu);
     divided[i] = two_mu * state.divided[i];
   }
   add_symmetric_adjoint(state.sigma, divided, S, B);

@@ -60,12 +60,13 @@ UNIPHY_INLINE ProjectionErrors<V> projection_errors(const IsotropicAnswers<T>& a
   const V t = p.trial.trace, least_cap = select<V>(fluid, t + lane_max(zero, t), t);
   p.of_trace = select<V>(p.cuts_trace, p.cap_t - sample[Column::projected_trace],
                          lane_max(zero, least_cap - p.cap_t));
-  const V decrease2 = fma(norm_decrease, norm_decrease, trace_decrease * trace_decrease * third);
+  const V decrease2 =
+      lane_fma(norm_decrease, norm_decrease, trace_decrease * trace_decrease * third);
   p.inverse_size2 = one / (decrease2 + V(a.strain_floor2 + T(kLeastSize2)));
   const V others =
-      fma(p.above, p.above, fma(p.of_fluid, p.of_fluid, p.of_trace * p.of_trace * third));
-  p.error = fma(p.partial, p.partial, others) * p.inverse_size2;
-  p.error_whole = fma(p.whole, p.whole, others) * p.inverse_size2;
+      lane_fma(p.above, p.above, lane_fma(p.of_fluid, p.of_fluid, p.of_trace * p.of_trace * third));
+  p.error = lane_fma(p.partial, p.partial, others) * p.inverse_size2;
+  p.error_whole = lane_fma(p.whole, p.whole, others) * p.inverse_size2;
   return p;
 }
 
@@ -147,7 +148,7 @@ inline void isotropic_errors(const IsotropicAnswers<T>& a, T* means) {
     const SampleLanes<V> sample(a.samples, l);
     answers.load(a, l);
     const V weight = first_lanes<V>(a.samples.count - l);
-    const auto add = [&](int k, const V& value) { sums[k] = fma(weight, value, sums[k]); };
+    const auto add = [&](int k, const V& value) { sums[k] = lane_fma(weight, value, sums[k]); };
     const ProjectionErrors<V> p = projection_errors<V, T>(a, sample, answers.caps, inv_e);
     add(kProjectionLoss, lane_log1p(p.error * inv_delta));
     add(kWholeLoss, lane_log1p(p.error_whole * inv_delta));

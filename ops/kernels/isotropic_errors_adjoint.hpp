@@ -25,17 +25,17 @@ UNIPHY_INLINE CapGradients<V> projection_errors_adjoint(const ProjectionErrors<V
 
   // ‖ε̂‖, by what the law does with it. Where it leaves ‖ε̂‖ alone the share's weight is a constant.
   const auto positive = p.cap_q > zero;
-  const V cut_q = fma(g_others, p.above, -fma(g_partial, share, g_whole));
-  const V zero_q = select<V>(positive, fma(g_partial, share, g_whole), zero);
+  const V cut_q = lane_fma(g_others, p.above, -lane_fma(g_partial, share, g_whole));
+  const V zero_q = select<V>(positive, lane_fma(g_partial, share, g_whole), zero);
   const V missed_q = select<V>(norm > p.cap_q, -(p.missed_weight * (g_partial + g_whole)), zero);
   const V g_q = select<V>(p.to_zero, zero_q, select<V>(p.cuts, cut_q, missed_q));
   const V excess = norm - select<V>(p.to_zero, lane_max(zero, p.cap_q), p.cap_q);
   const V of_excess = select<V>(p.to_zero, -excess, select<V>(p.cuts, excess, zero));  // da(r)/dr
-  const V g_share = fma(g_partial, of_excess, per_share);
+  const V g_share = lane_fma(g_partial, of_excess, per_share);
 
   // of_fluid is 0 unless c₁ moves it.
   const V of_fluid = g_others * p.of_fluid * V(T(kFluidWeight)) * norm;
-  const V g_c1 = fma(g_q, e, of_fluid);
+  const V g_c1 = lane_fma(g_q, e, of_fluid);
   // of_trace is 0 unless T moves it.
   const V of_trace = g_others * p.of_trace * V(T(1.0 / 3));
   const V g_c2 = select<V>(p.cuts_trace, of_trace, -of_trace) * e;
@@ -65,7 +65,8 @@ UNIPHY_INLINE CoefficientGradients<V> stress_errors_adjoint(const IsotropicAnswe
   V g_q = zero;
   const Vec3<V> gw = second_gradient(r.state, c.a2, S, g_q);
   const StrainInvariants<V>& v = r.state.invariants;
-  for (int i = 0; i < 3; ++i) g.log_e = g.log_e - fma(g_q, v.w[i] * v.inverse_root, gw[i]) * v.w[i];
+  for (int i = 0; i < 3; ++i)
+    g.log_e = g.log_e - lane_fma(g_q, v.w[i] * v.inverse_root, gw[i]) * v.w[i];
   return g;
 }
 

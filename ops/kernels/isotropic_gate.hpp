@@ -27,7 +27,7 @@ UNIPHY_INLINE StrainInvariants<V> strain_invariants(const HenckyStrain<V>& h, co
   const V d = V(T(kInvariantSmoothing));
   StrainInvariants<V> s;
   for (int i = 0; i < 3; ++i) s.w[i] = h.deviator[i] * inv_e;
-  const V root = lane_sqrt(fma(d, d, dot(s.w, s.w)));
+  const V root = lane_sqrt(lane_fma(d, d, dot(s.w, s.w)));
   s.inverse_root = V(T(1)) / root;
   s.q = root - d;
   const V inv2 = s.inverse_root * s.inverse_root;
@@ -90,7 +90,7 @@ UNIPHY_INLINE Caps<V> caps(const CapOutputs<V>& c, const V& rest, const V& t,
   Caps<V> r;
   r.slope = c.slope.value;
   r.per_m = c.slope.slope * t;
-  r.c1 = fma(r.slope, t, c.c0);
+  r.c1 = lane_fma(r.slope, t, c.c0);
   r.c2 = c.c2 - rest;
   r.mean_square = dot(stretch, stretch) * V(T(1.0 / 3));
   const V least = V(T(kLeastViscosity)) * r.mean_square;
@@ -137,7 +137,7 @@ UNIPHY_INLINE Gate<V> gate(const LearnedLaw<T>& law, const HenckyStrain<V>& h, c
   g.fluid = g.cap.c1 < V(T(kFluidCap)) && !g.caps_t;
   g.yields = g.cuts_q || g.caps_t;
   g.ratio = select<V>(g.caps_q, cap_q * safe_inverse(h.norm), zero);
-  const V cut = select<V>(g.fluid, zero, fma(g.cap.share, g.ratio - one, one));
+  const V cut = select<V>(g.fluid, zero, lane_fma(g.cap.share, g.ratio - one, one));
   g.map = log_map(h, select<V>(g.cuts_q, cut, one), select<V>(g.caps_t, cap_t, h.trace));
   return g;
 }

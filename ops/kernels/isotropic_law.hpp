@@ -101,16 +101,23 @@ inline void isotropic_tile_forward(const LearnedLaw<T>& law, std::ptrdiff_t coun
   constexpr int w = width_of<V>;
   const T e = law.strain_scale;
   const V inv_e(T(1) / e);
-  for (std::ptrdiff_t l = 0; l < kTile; l += w) {
-    const Svd3<V> s = svd3(load_mat3<V, T>(F_trial, l, count - l, true));
-    const HenckyStrain<V> strain = hencky_strain(s.sigma, false);
-    for (int k = 0; k < 9; ++k) store_plane(tile.U + k * kTile, l, s.U.e[k]);
-    for (int k = 0; k < 9; ++k) store_plane(tile.V + k * kTile, l, s.V_.e[k]);
-    for (int k = 0; k < 3; ++k) store_plane(tile.sigma + k * kTile, l, s.sigma[k]);
-    store_plane(tile.projection_in, l, strain.trace * inv_e);
-    const StrainInvariants<V> invariants = strain_invariants(strain, inv_e);
-    store_plane(tile.projection_in + kTile, l, invariants.q);
-    store_plane(tile.projection_in + 2 * kTile, l, invariants.cubic);
+  for (std::ptrdiff_t pair = 0; pair < kTile; pair += 2 * w) {
+    Svd3<V> svd[2];
+    svd3({load_mat3<V, T>(F_trial, pair, count - pair, true),
+          load_mat3<V, T>(F_trial, pair + w, count - pair - w, true)},
+         svd);
+    for (int half = 0; half < 2; ++half) {
+      const std::ptrdiff_t l = pair + half * w;
+      const Svd3<V>& s = svd[half];
+      const HenckyStrain<V> strain = hencky_strain(s.sigma, false);
+      for (int k = 0; k < 9; ++k) store_plane(tile.U + k * kTile, l, s.U.e[k]);
+      for (int k = 0; k < 9; ++k) store_plane(tile.V + k * kTile, l, s.V_.e[k]);
+      for (int k = 0; k < 3; ++k) store_plane(tile.sigma + k * kTile, l, s.sigma[k]);
+      store_plane(tile.projection_in, l, strain.trace * inv_e);
+      const StrainInvariants<V> invariants = strain_invariants(strain, inv_e);
+      store_plane(tile.projection_in + kTile, l, invariants.q);
+      store_plane(tile.projection_in + 2 * kTile, l, invariants.cubic);
+    }
   }
   h = network<keep>(law.projection, law.constant_projection, tile.projection_in,
                     tile.projection_tape);

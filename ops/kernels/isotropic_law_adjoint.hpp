@@ -102,7 +102,7 @@ inline void isotropic_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, Vi
     // invariants of w. gd is dL/dε̂, g_trace_p dL/dt.
     const V sum_S = S(0, 0) + S(1, 1) + S(2, 2);
     const V a1 = c.a1.value * inv_e;
-    V g_trace_p = fma(sum_S * c.k.value, m.volume.slope, f[0]) * inv_e;
+    V g_trace_p = lane_fma(sum_S * c.k.value, m.volume.slope, f[0]) * inv_e;
     const Vec3<V> of_second = second_gradient(s, c.a2, S, g_q);
     Vec3<V> gd;
     V ge = -(f[0] * s.volumetric);  // dL/d(log e) but for the measures', counted above
@@ -111,17 +111,17 @@ inline void isotropic_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, Vi
                    f[2] * v.d_cubic[i];
       ge = ge - gw * v.w[i];
       const V of_strain = S(i, i) * a1 * m.strain[i].slope;  // dL/dε_i, ε_i = ε̂_i + t/3
-      gd[i] = fma(gw, inv_e, of_strain);
-      g_trace_p = fma(of_strain, third, g_trace_p);
+      gd[i] = lane_fma(gw, inv_e, of_strain);
+      g_trace_p = lane_fma(of_strain, third, g_trace_p);
     }
 
     Mat3<V> G;  // dL/d(U ε̂ Uᵀ) off the diagonal
     for (int k = 0; k < 3; ++k) {
       const int i = kPair[k][0], j = kPair[k][1];
       const V of_w =
-          fma(S(i, j) * c.a2 * (v.w[i] + v.w[j]), s.spread, of.aligned * s.rate_frame(i, j));
+          lane_fma(S(i, j) * c.a2 * (v.w[i] + v.w[j]), s.spread, of.aligned * s.rate_frame(i, j));
       const V of_strain = a1 * seth_hill_divided_difference(s.h.eps[i], s.h.eps[j], c.n);
-      G(i, j) = G(j, i) = fma(S(i, j), of_strain, of_w * inv_e);
+      G(i, j) = G(j, i) = lane_fma(S(i, j), of_strain, of_w * inv_e);
     }
     // A fluid's F_proj is U Σ' Uᵀ = exp(t'/3) I.
     Mat3<V> A =
@@ -133,7 +133,7 @@ inline void isotropic_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, Vi
     if (grad_C) {
       Mat3<V> gD = compose(U, v.w, U) * of.aligned + gt * c.b.value +
                    s.rate * (of.rate_norm * s.inverse_rate_root);
-      const V mean = trace(gD) * third, g_rate_trace = fma(sum_S * third, c.b.value, f[3]);
+      const V mean = trace(gD) * third, g_rate_trace = lane_fma(sum_S * third, c.b.value, f[3]);
       for (int k = 0; k < 9; k += 4) gD.e[k] = gD.e[k] - mean + g_rate_trace;
       store_mat3<V, T>(grad_C, l, count - l, gD * V(T(kTimeScale)), true);
     }
@@ -150,7 +150,8 @@ inline void isotropic_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, Vi
     const V g_c2 = select<V>(g.caps_t, g_trace * V(e), zero);
     const V g_norm = -g_ratio * g.ratio * inv_norm;
     for (int i = 0; i < 3; ++i)
-      g_dev[i] = select<V>(g.yields, fma(g_norm * inv_norm, strain.deviator[i], g_dev[i]), zero);
+      g_dev[i] =
+          select<V>(g.yields, lane_fma(g_norm * inv_norm, strain.deviator[i], g_dev[i]), zero);
     g_trace = select<V>(g.yields && !g.caps_t, g_trace, zero);
     Mat3<V> D = select3(g.yields, B, A);
     D = select3(g.fluid, zero3<V>(), D);
@@ -158,7 +159,8 @@ inline void isotropic_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, Vi
     // b̄ = Σ max(σ, floor)²/3, and slope is 1/σ where σ moves it.
     const V g_square = two * third * g_share * g.cap.per_log_square / g.cap.mean_square;
     for (int i = 0; i < 3; ++i)
-      D(i, i) = fma(g_square * strain.stretch[i] * strain.stretch[i], strain.slope[i], D(i, i));
+      D(i, i) =
+          lane_fma(g_square * strain.stretch[i] * strain.stretch[i], strain.slope[i], D(i, i));
     store_plane(tile.grad_projection, l, g_c1);
     store_plane(tile.grad_projection + kTile, l, g_c2);
     store_plane(tile.grad_projection + 2 * kTile, l, g_c1 * g.cap.per_m);
@@ -186,7 +188,7 @@ inline void isotropic_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, Vi
     sum_log_e = sum_log_e - gt * strain.trace * inv_e;
     Vec3<V> gd;
     for (int i = 0; i < 3; ++i) {
-      const V gw = fma(gl, v.d_cubic[i], gq * v.w[i] * v.inverse_root);
+      const V gw = lane_fma(gl, v.d_cubic[i], gq * v.w[i] * v.inverse_root);
       sum_log_e = sum_log_e - gw * v.w[i];
       gd[i] = gw * inv_e;
     }

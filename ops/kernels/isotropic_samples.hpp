@@ -104,7 +104,7 @@ UNIPHY_INLINE StressState<V> sample_state(const SampleLanes<V>& sample, const V&
   HenckyStrain<V> h;
   h.deviator = sample.vector(IsotropicColumns::projected_deviator);
   h.trace = sample[IsotropicColumns::projected_trace];
-  for (int i = 0; i < 3; ++i) h.eps[i] = fma(h.trace, third, h.deviator[i]);
+  for (int i = 0; i < 3; ++i) h.eps[i] = lane_fma(h.trace, third, h.deviator[i]);
   Mat3<V> rate = sample.symmetric(IsotropicColumns::rate);
   const V rate_trace = trace(rate);
   for (int k = 0; k < 9; k += 4) rate.e[k] = rate.e[k] - rate_trace * third;
@@ -158,7 +158,7 @@ inline T isotropic_features_adjoint(const IsotropicSamples<T>& samples, const T*
       const V g_q = gradient(grad_projection, 1), g_cubic = gradient(grad_projection, 2);
       log_e = log_e - gradient(grad_projection, 0) * trial.trace * inv_e;
       for (int i = 0; i < 3; ++i)
-        log_e = log_e - fma(g_cubic, v.d_cubic[i], g_q * v.w[i] * v.inverse_root) * v.w[i];
+        log_e = log_e - lane_fma(g_cubic, v.d_cubic[i], g_q * v.w[i] * v.inverse_root) * v.w[i];
     }
     if (grad_stress) {
       const StressState<V> s = sample_state(sample, inv_e);

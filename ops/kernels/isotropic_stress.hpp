@@ -40,13 +40,13 @@ UNIPHY_INLINE StressState<V> stress_state(const HenckyStrain<V>& h, const Mat3<V
   s.rate = rate;
   s.rate_trace = rate_trace;
   const V d = V(T(kInvariantSmoothing));
-  const V rate_root = lane_sqrt(fma(d, d, dot(s.rate, s.rate)));
+  const V rate_root = lane_sqrt(lane_fma(d, d, dot(s.rate, s.rate)));
   s.rate_norm = rate_root - d;
   s.inverse_rate_root = one / rate_root;
   s.rate_frame = rate_frame;
   const Vec3<V>& w = s.invariants.w;
   s.aligned = w[0] * s.rate_frame(0, 0) + w[1] * s.rate_frame(1, 1) + w[2] * s.rate_frame(2, 2);
-  s.x = s.aligned / fma(s.rate_norm, s.invariants.q, one);
+  s.x = s.aligned / lane_fma(s.rate_norm, s.invariants.q, one);
   s.spread = one / (one + s.invariants.q);
   Vec3<V> w2;
   for (int i = 0; i < 3; ++i) w2[i] = w[i] * w[i];
@@ -128,11 +128,12 @@ template <class V>
 UNIPHY_INLINE Vec3<V> basis_diagonal(const StressState<V>& s, const Coefficients<V>& c,
                                      const Measures<V>& m, const V& inv_e) {
   using T = ScalarOf<V>;
-  const V pressure =
-      fma(c.k.value * inv_e, m.volume.value, fma(c.b.value * s.rate_trace, V(T(1.0 / 3)), c.a0));
+  const V pressure = lane_fma(c.k.value * inv_e, m.volume.value,
+                              lane_fma(c.b.value * s.rate_trace, V(T(1.0 / 3)), c.a0));
   const V a1 = c.a1.value * inv_e;
   Vec3<V> d;
-  for (int i = 0; i < 3; ++i) d[i] = fma(a1, m.strain[i].value, fma(c.a2, s.second[i], pressure));
+  for (int i = 0; i < 3; ++i)
+    d[i] = lane_fma(a1, m.strain[i].value, lane_fma(c.a2, s.second[i], pressure));
   return d;
 }
 /// The stress in units of s.
@@ -162,9 +163,9 @@ UNIPHY_INLINE CoefficientGradients<V> coefficient_gradients(const StressState<V>
   V g_a0 = zero, g_a1 = zero, g_a2 = zero, g_n = zero;
   for (int i = 0; i < 3; ++i) {
     g_a0 = g_a0 + S(i, i);
-    g_a1 = fma(S(i, i), m.strain[i].value * inv_e, g_a1);
-    g_a2 = fma(S(i, i), s.second[i], g_a2);
-    g_n = fma(S(i, i), m.strain[i].per_gamma + m.strain[i].per_delta, g_n);
+    g_a1 = lane_fma(S(i, i), m.strain[i].value * inv_e, g_a1);
+    g_a2 = lane_fma(S(i, i), s.second[i], g_a2);
+    g_n = lane_fma(S(i, i), m.strain[i].per_gamma + m.strain[i].per_delta, g_n);
   }
   const V g_k = g_a0 * m.volume.value * inv_e, g_volume = g_a0 * c.k.value * inv_e;
   const V g_b = of_rate + g_a0 * s.rate_trace * V(T(1.0 / 3));
@@ -200,7 +201,7 @@ template <class V>
 UNIPHY_INLINE FeatureGradients<V> feature_gradients(const StressState<V>& s, const V (&f)[6]) {
   // x = aligned / (1 + n q)
   const V one(ScalarOf<V>(1)), q = s.invariants.q;
-  const V inv_x = one / fma(s.rate_norm, q, one);
+  const V inv_x = one / lane_fma(s.rate_norm, q, one);
   return {f[5] * inv_x, f[4] - f[5] * s.x * q * inv_x, f[1] - f[5] * s.x * s.rate_norm * inv_x};
 }
 

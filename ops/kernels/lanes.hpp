@@ -97,15 +97,25 @@ template <class V> UNIPHY_INLINE V lane_max(const V& a, const V& b) {
 template <class V> UNIPHY_INLINE V lane_min(const V& a, const V& b) {
   if constexpr (is_scalar_lane<V>) return a < b ? a : b; else return xsimd::min(a, b);
 }
-/// a * b + c, fused where the instruction set fuses.
-template <class V> UNIPHY_INLINE V fma(const V& a, const V& b, const V& c) {
+#if defined(XSIMD_WITH_AVX512F) && XSIMD_WITH_AVX512F && XSIMD_VERSION_MAJOR < 9
+// xsimd 8 writes a * b + c for AVX-512: which product of a sum the compiler then fuses is its own
+// choice, and another one wherever the code around it is another.
+inline __m512 fused(__m512 a, __m512 b, __m512 c) { return _mm512_fmadd_ps(a, b, c); }
+inline __m512d fused(__m512d a, __m512d b, __m512d c) { return _mm512_fmadd_pd(a, b, c); }
+#endif
+/// a * b + c, fused where the instruction set fuses. (Not `fma`: batches would find xsimd's.)
+template <class V> UNIPHY_INLINE V lane_fma(const V& a, const V& b, const V& c) {
   if constexpr (is_scalar_lane<V>) {
 #if defined(__FMA__)
     return std::fma(a, b, c);
 #else
     return a * b + c;
 #endif
-  } else return xsimd::fma(a, b, c);
+  }
+#if defined(XSIMD_WITH_AVX512F) && XSIMD_WITH_AVX512F && XSIMD_VERSION_MAJOR < 9
+  else if constexpr (sizeof(V) == 64) return fused(a, b, c);
+#endif
+  else return xsimd::fma(a, b, c);
 }
 template <class V> UNIPHY_INLINE bool any(const MaskOf<V>& m) {
   if constexpr (is_scalar_lane<V>) return m; else return xsimd::any(m);

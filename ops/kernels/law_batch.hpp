@@ -118,11 +118,19 @@ constexpr typename LawTable<T>::Law law_entries() {
 template <class T>
 void svd3_batch(std::ptrdiff_t count, View<const T> F, View<T> U, View<T> sigma, View<T> Vh) {
   using V = Lanes<T>;
-  for (std::ptrdiff_t p = 0; p < count; p += width_of<V>) {
-    const Svd3<V> s = svd3(load_mat3<V, T>(F, p, count - p, true));
-    store_mat3<V, T>(U, p, count - p, s.U);
-    for (int k = 0; k < 3; ++k) store_lanes<V, T>(sigma, p, k, count - p, s.sigma[k]);
-    store_mat3<V, T>(Vh, p, count - p, transpose(s.V_));
+  constexpr std::ptrdiff_t w = width_of<V>;
+  for (std::ptrdiff_t pair = 0; pair < count; pair += 2 * w) {
+    const std::ptrdiff_t at[2] = {pair, pair + w};
+    Svd3<V> s[2];
+    svd3({load_mat3<V, T>(F, at[0], count - at[0], true),
+          load_mat3<V, T>(F, at[1], count - at[1], true)},
+         s);
+    for (int k = 0; k < 2; ++k) {
+      const std::ptrdiff_t p = at[k], left = count - p;
+      store_mat3<V, T>(U, p, left, s[k].U);
+      for (int i = 0; i < 3; ++i) store_lanes<V, T>(sigma, p, i, left, s[k].sigma[i]);
+      store_mat3<V, T>(Vh, p, left, transpose(s[k].V_));
+    }
   }
 }
 

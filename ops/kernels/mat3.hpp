@@ -42,21 +42,21 @@ template <class V> UNIPHY_INLINE Mat3<V> operator*(const Mat3<V>& a, const V& s)
 template <class V> UNIPHY_INLINE Mat3<V> mul(const Mat3<V>& a, const Mat3<V>& b) {
   Mat3<V> r;
   for (int i = 0; i < 3; ++i) for (int j = 0; j < 3; ++j)
-    r(i, j) = fma(a(i, 0), b(0, j), fma(a(i, 1), b(1, j), a(i, 2) * b(2, j)));
+    r(i, j) = lane_fma(a(i, 0), b(0, j), lane_fma(a(i, 1), b(1, j), a(i, 2) * b(2, j)));
   return r;
 }
 /// aᵀ b
 template <class V> UNIPHY_INLINE Mat3<V> tmul(const Mat3<V>& a, const Mat3<V>& b) {
   Mat3<V> r;
   for (int i = 0; i < 3; ++i) for (int j = 0; j < 3; ++j)
-    r(i, j) = fma(a(0, i), b(0, j), fma(a(1, i), b(1, j), a(2, i) * b(2, j)));
+    r(i, j) = lane_fma(a(0, i), b(0, j), lane_fma(a(1, i), b(1, j), a(2, i) * b(2, j)));
   return r;
 }
 /// a bᵀ
 template <class V> UNIPHY_INLINE Mat3<V> mult(const Mat3<V>& a, const Mat3<V>& b) {
   Mat3<V> r;
   for (int i = 0; i < 3; ++i) for (int j = 0; j < 3; ++j)
-    r(i, j) = fma(a(i, 0), b(j, 0), fma(a(i, 1), b(j, 1), a(i, 2) * b(j, 2)));
+    r(i, j) = lane_fma(a(i, 0), b(j, 0), lane_fma(a(i, 1), b(j, 1), a(i, 2) * b(j, 2)));
   return r;
 }
 /// a diag(d) bᵀ
@@ -76,7 +76,7 @@ template <class V> UNIPHY_INLINE Mat3<V> sym(const Mat3<V>& a) {
 template <class V> UNIPHY_INLINE V trace(const Mat3<V>& a) { return a.e[0] + a.e[4] + a.e[8]; }
 /// a : b
 template <class V> UNIPHY_INLINE V dot(const Mat3<V>& a, const Mat3<V>& b) {
-  V s = a.e[0] * b.e[0]; for (int k = 1; k < 9; ++k) s = fma(a.e[k], b.e[k], s); return s;
+  V s = a.e[0] * b.e[0]; for (int k = 1; k < 9; ++k) s = lane_fma(a.e[k], b.e[k], s); return s;
 }
 /// The matrix of cofactors, d(det a)/da = det(a) a⁻ᵀ.
 template <class V> UNIPHY_INLINE Mat3<V> cofactor(const Mat3<V>& a) {
@@ -94,7 +94,7 @@ template <class V> UNIPHY_INLINE V determinant(const Mat3<V>& a) {
 }
 template <class V> UNIPHY_INLINE V sum(const Vec3<V>& a) { return a[0] + a[1] + a[2]; }
 template <class V> UNIPHY_INLINE V dot(const Vec3<V>& a, const Vec3<V>& b) {
-  return fma(a[0], b[0], fma(a[1], b[1], a[2] * b[2]));
+  return lane_fma(a[0], b[0], lane_fma(a[1], b[1], a[2] * b[2]));
 }
 template <class V> UNIPHY_INLINE Mat3<V> select3(const MaskOf<V>& m, const Mat3<V>& a, const Mat3<V>& b) {
   Mat3<V> r; for (int k = 0; k < 9; ++k) r.e[k] = select<V>(m, a.e[k], b.e[k]); return r;

@@ -39,7 +39,7 @@ inline void tile_linear(int rows, int cols, const T* packed, const T* bias, cons
         for (int g = 0; g < kGroup; ++g) x[g] = V::load_aligned(in + c * kTile + l + g * w);
         for (int o = 0; o < kOutputBlock; ++o) {
           const V weight_o(weight[c * kOutputBlock + o]);
-          for (int g = 0; g < kGroup; ++g) sum[o][g] = fma(weight_o, x[g], sum[o][g]);
+          for (int g = 0; g < kGroup; ++g) sum[o][g] = lane_fma(weight_o, x[g], sum[o][g]);
         }
       }
       for (int o = 0; o < kOutputBlock; ++o)

@@ -25,7 +25,7 @@ struct Newtonian {
   static UNIPHY_INLINE Mat3<V> stress(const Mat3<V>& F, const Mat3<V>& C, const Material<V>& m) {
     using T = ScalarOf<V>;
     const V J = clamped_volume(determinant(F), V(minimum_J<T>()));
-    const V kappa = fma(V(T(2.0 / 3)), m.mu, m.lambda);
+    const V kappa = lane_fma(V(T(2.0 / 3)), m.mu, m.lambda);
     const V pressure = kappa * (J - inverse_sixth_power(J));
     Mat3<V> tau = sym(C) * m.mu;
     for (int i = 0; i < 3; ++i) tau(i, i) = tau(i, i) + pressure;
@@ -40,7 +40,7 @@ struct Newtonian {
                                               Mat3<V>& grad_C, MaterialGradient<V>& g) {
     using T = ScalarOf<V>;
     const V floor = V(minimum_J<T>()), det = determinant(F), J = clamped_volume(det, floor);
-    const V kappa = fma(V(T(2.0 / 3)), m.mu, m.lambda);
+    const V kappa = lane_fma(V(T(2.0 / 3)), m.mu, m.lambda);
     const V sixth = inverse_sixth_power(J), trace_G = trace(G);
     const Mat3<V> symmetric = sym(G);
     const V volume = (J - sixth) * trace_G;

@@ -100,11 +100,11 @@ template <class T> UNIPHY_INLINE NodeRow<T> operator*(T a, NodeRow<T> b) {
   return b;
 }
 /// c + a b; the compiler fuses it where the instruction set can.
-template <class T> UNIPHY_INLINE NodeRow<T> fma(T a, const NodeRow<T>& b, NodeRow<T> c) {
+template <class T> UNIPHY_INLINE NodeRow<T> lane_fma(T a, const NodeRow<T>& b, NodeRow<T> c) {
   for (int p = 0; p < NodeRow<T>::kParts; ++p) c.part[p] += a * b.part[p];
   return c;
 }
-template <class T> UNIPHY_INLINE NodeRow<T> fma(const NodeRow<T>& a, const NodeRow<T>& b, NodeRow<T> c) {
+template <class T> UNIPHY_INLINE NodeRow<T> lane_fma(const NodeRow<T>& a, const NodeRow<T>& b, NodeRow<T> c) {
   for (int p = 0; p < NodeRow<T>::kParts; ++p) c.part[p] += a.part[p] * b.part[p];
   return c;
 }

@@ -110,7 +110,7 @@ void scatter(const TransferChunk<T>& chunk, const GridView<T>& grid, int layer_b
     const Row wz = row_weights(chunk.f[2][l]);
     const T* record = chunk.record[l];
     prefetch_record_after(record);
-    const Row q = fma(index, Row::repeat4(record + 12), Row::repeat4(record)) * wz;
+    const Row q = lane_fma(index, Row::repeat4(record + 12), Row::repeat4(record)) * wz;
     const Row ax = Row::repeat4(record + 4) * wz;
     const Row ay = Row::repeat4(record + 8) * wz;
     T* layer = node_at(grid, base + from, chunk.base[1][l], chunk.base[2][l]);
@@ -118,11 +118,11 @@ void scatter(const TransferChunk<T>& chunk, const GridView<T>& grid, int layer_b
     // the border between two threads or not.
 #pragma GCC unroll 1
     for (int i = from; i < to; ++i, layer += layer_stride) {
-      const Row q_i = wx[i] * fma(T(i), ax, q);
+      const Row q_i = wx[i] * lane_fma(T(i), ax, q);
       const Row ay_i = wx[i] * ay;
       for (int j = 0; j < 3; ++j) {
         T* at = layer + j * row_stride;
-        fma(wy[j], fma(T(j), ay_i, q_i), Row::load(at)).store(at);
+        lane_fma(wy[j], lane_fma(T(j), ay_i, q_i), Row::load(at)).store(at);
       }
     }
   }

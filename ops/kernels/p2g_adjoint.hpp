@@ -25,30 +25,30 @@ void gather_adjoint(const TransferChunk<T>& chunk, const GridView<const T>& grid
     const Row wz = row_weights(chunk.f[2][l]);
     const T* record = chunk.record[l];
     if (slopes_only) prefetch_record_after(record);
-    const Row q = fma(index, Row::repeat4(record + 12), Row::repeat4(record));
+    const Row q = lane_fma(index, Row::repeat4(record + 12), Row::repeat4(record));
     const Row ax = Row::repeat4(record + 4), ay = Row::repeat4(record + 8);
     const T* layer = node_at(grid, chunk.base[0][l], chunk.base[1][l], chunk.base[2][l]);
     Row sum = Row::zero(), sum_x = Row::zero(), sum_y = Row::zero();
     Row work = Row::zero(), work_x = Row::zero(), work_y = Row::zero();
     for (int i = 0; i < 3; ++i, layer += layer_stride) {
-      const Row q_i = fma(T(i), ax, q);
+      const Row q_i = lane_fma(T(i), ax, q);
       Row along = Row::zero(), along_slope = Row::zero();
       Row part[3];
       for (int j = 0; j < 3; ++j) {
         const Row h = Row::load(layer + j * row_stride);
-        const Row product = h * fma(T(j), ay, q_i);
-        along = fma(wy[j], product, along);
-        along_slope = fma(dy[j], product, along_slope);
+        const Row product = h * lane_fma(T(j), ay, q_i);
+        along = lane_fma(wy[j], product, along);
+        along_slope = lane_fma(dy[j], product, along_slope);
         if (!slopes_only) part[j] = wy[j] * h;
       }
-      work = fma(wx[i], along, work);
-      work_x = fma(dx[i], along, work_x);
-      work_y = fma(wx[i], along_slope, work_y);
+      work = lane_fma(wx[i], along, work);
+      work_x = lane_fma(dx[i], along, work_x);
+      work_y = lane_fma(wx[i], along_slope, work_y);
       if (!slopes_only) {
         const Row along_y = part[0] + (part[1] + part[2]);
-        sum = fma(wx[i], along_y, sum);
-        if (i > 0) sum_x = fma(T(i) * wx[i], along_y, sum_x);
-        sum_y = fma(wx[i], fma(T(2), part[2], part[1]), sum_y);
+        sum = lane_fma(wx[i], along_y, sum);
+        if (i > 0) sum_x = lane_fma(T(i) * wx[i], along_y, sum_x);
+        sum_y = lane_fma(wx[i], lane_fma(T(2), part[2], part[1]), sum_y);
       }
     }
     const Row slope_z = row_weight_slopes(chunk.f[2][l]);
@@ -104,10 +104,10 @@ void p2g_adjoint_finish(const TransferChunk<T>& chunk, const T* moments, const T
         const V g_a = load_plane<V>(moments, 4 + 4 * b + c, l) - f * g_q[c];
         store_plane<V>(grad_tau, 3 * c + b, l, per_tau * g_a);
         const int k = kPlaneC + 3 * c + b;
-        store_plane<V>(grad, k, l, fma(m * dx, g_a, load_plane<V>(grad, k, l)));
+        store_plane<V>(grad, k, l, lane_fma(m * dx, g_a, load_plane<V>(grad, k, l)));
       }
       const int k = kPlaneX + b;
-      store_plane<V>(grad, k, l, fma(g_f, inv_dx, load_plane<V>(grad, k, l)));
+      store_plane<V>(grad, k, l, lane_fma(g_f, inv_dx, load_plane<V>(grad, k, l)));
     }
   }
 }

@@ -26,7 +26,7 @@ struct StrainGradient {
   UNIPHY_INLINE void add_norm(const HenckyStrain<V>& h, const V& w) {
     using T = ScalarOf<V>;
     const V c = w / select<V>(h.norm > V(T(0)), h.norm, V(T(1)));
-    for (int i = 0; i < 3; ++i) deviator[i] = fma(c, h.deviator[i], deviator[i]);
+    for (int i = 0; i < 3; ++i) deviator[i] = lane_fma(c, h.deviator[i], deviator[i]);
   }
 };
 

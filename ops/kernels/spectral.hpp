@@ -40,13 +40,13 @@ UNIPHY_INLINE V log_divided_difference(const V& a, const V& b, const V& log_a, c
   const V d = a - b, s = one / (a + b), r = d * s, r2 = r * r;
   // Seven terms reach 1e-16 relative below |r| = 0.1.
   V series(T(1.0 / 15));
-  series = fma(series, r2, V(T(1.0 / 13)));
-  series = fma(series, r2, V(T(1.0 / 11)));
-  series = fma(series, r2, V(T(1.0 / 9)));
-  series = fma(series, r2, V(T(1.0 / 7)));
-  series = fma(series, r2, V(T(1.0 / 5)));
-  series = fma(series, r2, V(T(1.0 / 3)));
-  series = fma(series, r2, one);
+  series = lane_fma(series, r2, V(T(1.0 / 13)));
+  series = lane_fma(series, r2, V(T(1.0 / 11)));
+  series = lane_fma(series, r2, V(T(1.0 / 9)));
+  series = lane_fma(series, r2, V(T(1.0 / 7)));
+  series = lane_fma(series, r2, V(T(1.0 / 5)));
+  series = lane_fma(series, r2, V(T(1.0 / 3)));
+  series = lane_fma(series, r2, one);
   const auto near = lane_abs(r) < V(T(0.1));
   return select<V>(near, (s + s) * series, (log_a - log_b) / select<V>(near, one, d));
 }
@@ -58,11 +58,11 @@ UNIPHY_INLINE V exp_divided_difference(const V& a, const V& b, const V& exp_a, c
   const V one(T(1));
   const V d = a - b, h = d * V(T(0.5)), h2 = h * h;
   V series(T(1.0 / 39916800));
-  series = fma(series, h2, V(T(1.0 / 362880)));
-  series = fma(series, h2, V(T(1.0 / 5040)));
-  series = fma(series, h2, V(T(1.0 / 120)));
-  series = fma(series, h2, V(T(1.0 / 6)));
-  series = fma(series, h2, one);
+  series = lane_fma(series, h2, V(T(1.0 / 362880)));
+  series = lane_fma(series, h2, V(T(1.0 / 5040)));
+  series = lane_fma(series, h2, V(T(1.0 / 120)));
+  series = lane_fma(series, h2, V(T(1.0 / 6)));
+  series = lane_fma(series, h2, one);
   const auto near = lane_abs(d) < V(T(0.5));
   return select<V>(near, lane_sqrt(exp_a * exp_b) * series,
                    (exp_a - exp_b) / select<V>(near, one, d));
@@ -128,7 +128,7 @@ UNIPHY_INLINE LogMap<V> log_map(const HenckyStrain<V>& h, const V& scale, const 
   m.trace = trace;
   const V mean = trace * V(T(1.0 / 3));
   for (int i = 0; i < 3; ++i) {
-    m.log_sigma[i] = fma(scale, h.deviator[i], mean);
+    m.log_sigma[i] = lane_fma(scale, h.deviator[i], mean);
     m.sigma[i] = lane_exp(m.log_sigma[i]);
   }
   return m;
@@ -169,7 +169,7 @@ UNIPHY_INLINE void add_strain_gradient(const HenckyStrain<V>& h, const Vec3<V>& 
                                        const V& grad_trace, Mat3<V>& B) {
   using T = ScalarOf<V>;
   const V shift = grad_trace - sum(grad_deviator) * V(T(1.0 / 3));
-  for (int i = 0; i < 3; ++i) B(i, i) = fma(grad_deviator[i] + shift, h.slope[i], B(i, i));
+  for (int i = 0; i < 3; ++i) B(i, i) = lane_fma(grad_deviator[i] + shift, h.slope[i], B(i, i));
 }
 
 /// Adds the off-diagonal adjoint of T(F) = U diag(t) Uᵀ to the frame gradient B, given
@@ -181,8 +181,8 @@ UNIPHY_INLINE void add_symmetric_adjoint(const Vec3<V>& sigma, const Vec3<V>& di
   for (int k = 0; k < 3; ++k) {
     const int i = kPair[k][0], j = kPair[k][1];
     const V c = (S(i, j) + S(j, i)) * divided[k] * inverse_sum(sigma[i], sigma[j]);
-    B(i, j) = fma(c, sigma[j], B(i, j));
-    B(j, i) = fma(c, sigma[i], B(j, i));
+    B(i, j) = lane_fma(c, sigma[j], B(i, j));
+    B(j, i) = lane_fma(c, sigma[i], B(j, i));
   }
 }
 

@@ -26,10 +26,10 @@ UNIPHY_INLINE Sinhc<V> sinhc(const V& y) {
   V value(T(1.0 / 1307674368000)), slope(T(14.0 / 1307674368000));
   constexpr double kFactorial[6] = {6227020800, 39916800, 362880, 5040, 120, 6};
   for (int k = 0; k < 6; ++k) {
-    value = fma(value, y2, V(T(1.0 / kFactorial[k])));
-    slope = fma(slope, y2, V(T((12.0 - 2 * k) / kFactorial[k])));
+    value = lane_fma(value, y2, V(T(1.0 / kFactorial[k])));
+    slope = lane_fma(slope, y2, V(T((12.0 - 2 * k) / kFactorial[k])));
   }
-  value = fma(value, y2, one);
+  value = lane_fma(value, y2, one);
   slope = slope * y;
   const auto near = lane_abs(y) < half;
   const V up = lane_exp(y), down = one / up, inverse = one / select<V>(near, one, y);
@@ -55,7 +55,7 @@ UNIPHY_INLINE StrainMeasure<V> strain_measure(const V& x, const V& gamma, const 
   m.value = x * ratio;
   const V of_y = select<V>(lane_abs(y) < limit, x * factor * s.slope, zero);
   const V of_d = select<V>(lane_abs(d) < limit, m.value, zero);
-  m.slope = fma(of_y, gamma, fma(of_d, delta, ratio));
+  m.slope = lane_fma(of_y, gamma, lane_fma(of_d, delta, ratio));
   m.per_gamma = of_y * x;
   m.per_delta = of_d * x;
   return m;

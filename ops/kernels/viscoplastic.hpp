@@ -35,7 +35,7 @@ struct Viscoplastic {
     const V one(ScalarOf<V>(1)), k = m.tau_y / (m.mu + m.mu);
     ReturnMap<V> r;
     r.yields = h.norm > k;
-    const V norm = fma(rate(h, m).r, h.norm - k, k);
+    const V norm = lane_fma(rate(h, m).r, h.norm - k, k);
     r.scale = select<V>(r.yields, norm / select<V>(r.yields, h.norm, one), one);
     r.trace = h.trace;
     return r;

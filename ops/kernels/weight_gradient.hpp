@@ -43,7 +43,7 @@ inline void add_outer_products(const T* g, const T* x, std::ptrdiff_t stride, T*
     for (int v = 0; v < kVectors; ++v) of_x[v] = V::load_aligned(x + l * stride + v * w);
     for (int o = 0; o < kOut; ++o) {
       const V of_g(g[o * kTile + l]);
-      for (int v = 0; v < kVectors; ++v) sum[o][v] = fma(of_g, of_x[v], sum[o][v]);
+      for (int v = 0; v < kVectors; ++v) sum[o][v] = lane_fma(of_g, of_x[v], sum[o][v]);
     }
   }
   for (int o = 0; o < kOut; ++o)

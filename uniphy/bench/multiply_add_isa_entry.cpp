@@ -13,7 +13,7 @@ double multiply_adds_of_isa(std::ptrdiff_t repeats, float* sink) {
   V sum[kChains];
   for (int c = 0; c < kChains; ++c) sum[c] = V(static_cast<float>(c));
   for (std::ptrdiff_t r = 0; r < repeats; ++r) {
-    for (int c = 0; c < kChains; ++c) sum[c] = fma(sum[c], factor, term);
+    for (int c = 0; c < kChains; ++c) sum[c] = lane_fma(sum[c], factor, term);
   }
   V total = sum[0];
   for (int c = 1; c < kChains; ++c) total = total + sum[c];
