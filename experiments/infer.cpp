@@ -59,8 +59,8 @@ int main(int argc, char** argv) {
        "uniphy_infer configs/infer/elastic.yaml"}};
   return uniphy::run_experiment(
       argc, argv, info, [](uniphy::Section& config) -> uniphy::RunFunction {
-        const std::string file =
-            config.text("observation", uniphy::required, "observed positions (observation.h5)");
+        const std::filesystem::path file = config.input_file("observation", uniphy::required,
+                                                             "observed positions (observation.h5)");
         const uniphy::UnknownsSource source = uniphy::read_unknowns(config);
         const uniphy::FitOptions options = uniphy::read_fit_options(config);
         return [=](uniphy::RunDirectory& out, uniphy::Metrics& metrics) {

@@ -21,9 +21,9 @@ int main(int argc, char** argv) {
   return uniphy::run_experiment(
       argc, argv, info, [](uniphy::Section& config) -> uniphy::RunFunction {
         uniphy::Section fitted = config.section("fitted", "the identified material");
-        const std::string latent = fitted.text("latent", uniphy::required,
-                                               "latent.h5, or the output folder that holds it");
-        const std::string model = fitted.text(
+        const std::filesystem::path latent = fitted.input_path(
+            "latent", uniphy::required, "latent.h5, or the output folder that holds it");
+        const std::filesystem::path model = fitted.input_file(
             "model", std::string(), "model file; absent: the one that the latent file names");
         const auto bodies = fitted.texts("bodies", std::vector<std::string>(),
                                          "names of the bodies made of it; empty: all");

@@ -3,6 +3,8 @@
 #include <cstdio>
 #include <limits>
 
+#include "ops/kernels/minimum_stretch.hpp"
+
 namespace uniphy::models {
 
 using kernels::Activation;

@@ -3,6 +3,7 @@
 #include <torch/torch.h>
 
 #include "ops/kernels/transfers.hpp"
+#include "ops/once_differentiable.hpp"
 #include "ops/saved_grid.hpp"
 #include "ops/tensor_check.hpp"
 
@@ -48,13 +49,14 @@ class G2pFunction : public torch::autograd::Function<G2pFunction> {
                                 gradient_data<T>(grad_out[2]), to(grad_x), to(grad_velocity));
       });
     }
-    return {grad_x, grad_velocity, Tensor()};
+    return once_differentiable("g2p", {grad_x, grad_velocity, Tensor()});
   }
 };
 
 }  // namespace
 
 G2p g2p(const Tensor& x, const Tensor& velocity, const kernels::GridSettings& settings) {
+  settings.check();
   const std::int64_t n = settings.n;
   const auto type = real_type("g2p", "x", x);
   const variable_list out =

@@ -3,6 +3,7 @@
 #include <torch/torch.h>
 
 #include "ops/kernels/transfers.hpp"
+#include "ops/once_differentiable.hpp"
 #include "ops/saved_grid.hpp"
 #include "ops/tensor_check.hpp"
 
@@ -40,13 +41,14 @@ class GridUpdateFunction : public torch::autograd::Function<GridUpdateFunction> 
       kernels::grid_update_adjoint<T>(settings, saved[0].data_ptr<T>(), saved[1].data_ptr<T>(),
                                       gradient_data<T>(grad_out[0]), grad.data_ptr<T>());
     });
-    return {grad, Tensor()};
+    return once_differentiable("grid_update", {grad, Tensor()});
   }
 };
 
 }  // namespace
 
 Tensor grid_update(const Tensor& grid, const kernels::GridSettings& settings) {
+  settings.check();
   const std::int64_t n = settings.n;
   const auto type = real_type("grid_update", "grid", grid);
   return GridUpdateFunction::apply(checked("grid_update", "grid", grid, type, {n, n, n, 4}),

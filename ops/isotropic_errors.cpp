@@ -7,6 +7,7 @@
 
 #include "ops/kernels/error.hpp"
 #include "ops/kernels/learned_law_weights.hpp"
+#include "ops/once_differentiable.hpp"
 #include "ops/plain_tensors.hpp"
 #include "ops/planes.hpp"
 #include "ops/reference/isotropic_errors.hpp"
@@ -172,7 +173,7 @@ class IsotropicErrorsFunction : public torch::autograd::Function<IsotropicErrors
     result[2] = to.caps_rest;
     result[3] = to.moduli;
     result[4] = to.moduli_rest;
-    return result;
+    return once_differentiable("isotropic_errors", std::move(result));
   }
 };
 
@@ -222,7 +223,7 @@ class IsotropicFeaturesFunction : public torch::autograd::Function<IsotropicFeat
                                    of_projection ? of_projection + 3 * m * i : nullptr,
                                    of_stress ? of_stress + 6 * m * i : nullptr);
     });
-    return result;
+    return once_differentiable("isotropic_features", std::move(result));
   }
 };
 

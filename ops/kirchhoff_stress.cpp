@@ -2,6 +2,8 @@
 
 #include <torch/torch.h>
 
+#include "ops/once_differentiable.hpp"
+
 namespace uniphy::ops {
 
 using kernels::LawId;
@@ -70,7 +72,7 @@ class KirchhoffStressFunction : public torch::autograd::Function<KirchhoffStress
         F.scalar_type() == torch::kFloat64
             ? backward_kernel<double>(law, F, C, saved[2], g, grad_F, grad_C, parameters_too)
             : backward_kernel<float>(law, F, C, saved[2], g, grad_F, grad_C, parameters_too);
-    return {grad_F, grad_C, grad_packed, Tensor()};
+    return once_differentiable("kirchhoff_stress", {grad_F, grad_C, grad_packed, Tensor()});
   }
 };
 

@@ -3,11 +3,13 @@
 #include <torch/torch.h>
 
 #include <algorithm>
-#include <sstream>
 #include <vector>
 
 #include "ops/kernels/error.hpp"
 #include "ops/kernels/learned_law.hpp"
+#include "ops/material.hpp"
+#include "ops/once_differentiable.hpp"
+#include "ops/tensor_check.hpp"
 
 namespace uniphy::ops {
 
@@ -23,44 +25,14 @@ namespace {
 /// Particles a thread takes at once: fixed, so that sums over particles have one order.
 constexpr std::ptrdiff_t kBlock = 4 * kernels::kLawChunk;
 
-std::string describe(const Tensor& t) {
-  if (!t.defined()) return "an undefined tensor";
-  std::ostringstream s;
-  s << t.sizes() << " " << t.scalar_type() << " on " << t.device();
-  return s.str();
-}
-
-void check(const char* name, const Tensor& t, const Tensor& F, bool per_particle, int64_t size) {
-  const bool typed = t.defined() && t.device().is_cpu() && t.scalar_type() == F.scalar_type();
-  const bool shaped = typed && (per_particle ? t.sizes() == F.sizes() : t.sizes() == size);
-  if (shaped) return;
-  std::ostringstream s;
-  s << "learned law: " << name << ": expected ";
-  if (per_particle)
-    s << F.sizes();
-  else
-    s << "[" << size << "]";
-  throw Error(s.str() + " " + c10::toString(F.scalar_type()) + " on cpu, found " + describe(t));
-}
+constexpr const char* kOp = "learned law";
 
 void check_arguments(const SharedWeights& weights, const char* F_name, const Tensor& F,
                      const Tensor& C, const Tensor& z) {
   if (!weights) throw Error("learned law: expected a trained model, found none");
-  if (!F.defined() || !F.device().is_cpu() || F.dim() != 3 || F.size(1) != 3 || F.size(2) != 3 ||
-      (F.scalar_type() != torch::kFloat32 && F.scalar_type() != torch::kFloat64))
-    throw Error(std::string("learned law: ") + F_name +
-                ": expected [P, 3, 3] Float or Double on cpu, found " + describe(F));
-  if (C.defined()) check("C", C, F, true, 0);
-  check("z", z, F, false, weights->latent_size);
-}
-
-template <class T>
-View<const T> view(const Tensor& t) {
-  return {t.defined() ? t.data_ptr<T>() : nullptr, 9, 1};
-}
-template <class T>
-View<T> mutable_view(const Tensor& t) {
-  return {t.defined() ? t.data_ptr<T>() : nullptr, 9, 1};
+  check_matrices(kOp, F_name, F);
+  if (C.defined()) check_like(kOp, "C", C, F);
+  check_tensor(kOp, "z", z, F.scalar_type(), {weights->latent_size});
 }
 
 /// The kernels of one forward call, kept for its backward.
@@ -85,8 +57,8 @@ template <class T>
 void evaluate(const LawKernel<T>& law, const Tensor& F, const Tensor& C, const Tensor& F_proj,
               const Tensor& tau) {
   const std::ptrdiff_t count = F.size(0);
-  const View<const T> f = view<T>(F), c = view<T>(C);
-  const View<T> fp = mutable_view<T>(F_proj), t = mutable_view<T>(tau);
+  const View<const T> f = matrix_view<T>(F), c = matrix_view<T>(C);
+  const View<T> fp = mutable_matrix_view<T>(F_proj), t = mutable_matrix_view<T>(tau);
 #pragma omp parallel for schedule(static)
   for (std::ptrdiff_t p = 0; p < count; p += kBlock)
     law.evaluate(std::min(kBlock, count - p), T(0), f.from(p), c.from(p), fp.from(p), t.from(p));
@@ -98,9 +70,9 @@ void adjoint(const LawKernel<T>& law, const Tensor& F, const Tensor& C, const Te
              const Tensor& grad_z) {
   const std::ptrdiff_t count = F.size(0), blocks = (count + kBlock - 1) / kBlock;
   const std::ptrdiff_t size = law.accumulator_size();
-  const View<const T> f = view<T>(F), c = view<T>(C), gp = view<T>(grad_F_proj),
-                      gt = view<T>(grad_tau);
-  const View<T> gf = mutable_view<T>(grad_F), gc = mutable_view<T>(grad_C);
+  const View<const T> f = matrix_view<T>(F), c = matrix_view<T>(C),
+                      gp = matrix_view<T>(grad_F_proj), gt = matrix_view<T>(grad_tau);
+  const View<T> gf = mutable_matrix_view<T>(grad_F), gc = mutable_matrix_view<T>(grad_C);
   std::vector<T> sums(grad_z.defined() ? std::size_t(blocks * size) : 0, T(0));
 #pragma omp parallel for schedule(static)
   for (std::ptrdiff_t b = 0; b < blocks; ++b) {
@@ -151,7 +123,7 @@ class LearnedLawFunction : public torch::autograd::Function<LearnedLawFunction> 
       adjoint(*kernel->wide, F, C, grad_F_proj, grad_tau, grad_F, grad_C, grad_z);
     else
       adjoint(*kernel->narrow, F, C, grad_F_proj, grad_tau, grad_F, grad_C, grad_z);
-    return {grad_F, grad_C, grad_z, Tensor()};
+    return once_differentiable(kOp, {grad_F, grad_C, grad_z, Tensor()});
   }
 };
 
@@ -165,7 +137,7 @@ LawOutput apply(const SharedWeights& weights, const Tensor& F, const Tensor& C, 
 LawOutput learned_law(const SharedWeights& weights, const Tensor& F_trial, const Tensor& C,
                       const Tensor& z) {
   check_arguments(weights, "F_trial", F_trial, C, z);
-  if (!C.defined()) check("C", C, F_trial, true, 0);
+  if (!C.defined()) check_like(kOp, "C", C, F_trial);
   return apply(weights, F_trial, C, z);
 }
 
@@ -177,7 +149,7 @@ Tensor learned_project(const SharedWeights& weights, const Tensor& F, const Tens
 Tensor learned_stress(const SharedWeights& weights, const Tensor& F_proj, const Tensor& C,
                       const Tensor& z) {
   check_arguments(weights, "F_proj", F_proj, C, z);
-  if (!C.defined()) check("C", C, F_proj, true, 0);
+  if (!C.defined()) check_like(kOp, "C", C, F_proj);
   return apply(kernels::without_projection(*weights), F_proj, C, z).tau;
 }
 

@@ -8,7 +8,7 @@
 
 // The learned law as differentiable ops around its fused kernels (ops/kernels/learned_law.hpp,
 // where the formulas stand). Gradients go to F, C and z; the weights are constants (Algorithm 2
-// fits z alone; training goes through models/learned_law.hpp).
+// fits z alone; uniphy/training trains them, models/learned_law.hpp has them as a torch module).
 //
 // F, F_trial, F_proj, C [P, 3, 3], z [Z]: CPU, all float32 or all float64. C in 1/s, tau in Pa. The
 // results, and the gradient of z, have the same bits on any number of threads. Throws Error naming

@@ -8,19 +8,13 @@
 
 #include "ops/kernels/analytic_law.hpp"
 #include "ops/kernels/error.hpp"
+#include "ops/tensor_check.hpp"
 
 namespace uniphy::ops {
 
 using torch::Tensor;
 
 namespace {
-
-std::string describe(const Tensor& t) {
-  if (!t.defined()) return "an undefined tensor";
-  std::ostringstream s;
-  s << t.sizes() << " " << t.scalar_type() << " on " << t.device();
-  return s.str();
-}
 
 [[noreturn]] void fail(const char* op, const char* name, const std::string& expected,
                        const Tensor& found) {

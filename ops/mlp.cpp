@@ -7,6 +7,7 @@
 #include "ops/kernels/error.hpp"
 #include "ops/kernels/learned_law_table.hpp"
 #include "ops/mlp_problem.hpp"
+#include "ops/once_differentiable.hpp"
 #include "ops/plain_tensors.hpp"
 #include "ops/planes.hpp"
 #include "ops/tensor_check.hpp"
@@ -24,6 +25,7 @@ constexpr std::int64_t kSums = 8;
 
 std::string shape_of(const torch::Tensor& t) {
   std::ostringstream text;
+  if (!t.defined()) return "an undefined tensor";
   text << t.scalar_type() << " " << t.sizes();
   return text.str();
 }
@@ -44,17 +46,15 @@ void check_layers(std::int64_t in, torch::ScalarType type, const std::vector<Lin
 }
 
 void check(const torch::Tensor& x, const std::vector<LinearLayer>& layers) {
-  if (x.dim() != 2 || !torch::isFloatingType(x.scalar_type()))
-    throw Error("mlp: x: expected a floating-point tensor [samples, features], found " +
-                shape_of(x));
+  real_type("mlp", "x", x);
+  if (x.dim() != 2) throw Error("mlp: x: expected [samples, features], found " + shape_of(x));
   check_layers(x.size(1), x.scalar_type(), layers);
 }
 
 void check(const torch::Tensor& features, const torch::Tensor& z) {
-  if (features.dim() != 3 || !torch::isFloatingType(features.scalar_type()))
-    throw Error(
-        "mlp: features: expected a floating-point tensor [codes, samples, features], found " +
-        shape_of(features));
+  real_type("mlp", "features", features);
+  if (features.dim() != 3)
+    throw Error("mlp: features: expected [codes, samples, features], found " + shape_of(features));
   if (z.dim() != 2 || z.size(0) != features.size(0) || z.scalar_type() != features.scalar_type())
     throw Error("mlp: z: expected [" + std::to_string(features.size(0)) + ", any] of type " +
                 std::string(torch::toString(features.scalar_type())) + ", found " + shape_of(z));
@@ -226,7 +226,7 @@ struct MlpFunction : torch::autograd::Function<MlpFunction> {
                         ctx->needs_input_grad(1), ctx->needs_input_grad(2));
       std::copy(g.begin(), g.end(), result.begin());
     });
-    return result;
+    return once_differentiable("mlp", std::move(result));
   }
 };
 
@@ -271,6 +271,11 @@ std::vector<LinearLayer> layers_of(const FlatLayers& flat) {
 
 FlatLayers flatten(const std::vector<LinearLayer>& layers) {
   if (layers.empty()) throw Error("flatten: expected at least one layer");
+  for (const LinearLayer& layer : layers) {
+    if (!layer.weight.defined() || layer.weight.dim() != 2 || !layer.bias.defined())
+      throw Error("flatten: expected weights [out, in] and biases [out], found " +
+                  shape_of(layer.weight) + " and " + shape_of(layer.bias));
+  }
   variable_list tensors;
   std::vector<std::int64_t> widths{layers.front().weight.size(1)};
   for (const LinearLayer& layer : layers) {

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "ops/kernels/error.hpp"
+#include "ops/once_differentiable.hpp"
 
 namespace uniphy::ops {
 
@@ -74,7 +75,7 @@ class ReturnMappingFunction : public torch::autograd::Function<ReturnMappingFunc
         F.scalar_type() == torch::kFloat64
             ? backward_kernel<double>(law, F, saved[1], dt, g, grad_F, parameters_too)
             : backward_kernel<float>(law, F, saved[1], dt, g, grad_F, parameters_too);
-    return {grad_F, grad_packed, Tensor(), Tensor()};
+    return once_differentiable("return_mapping", {grad_F, grad_packed, Tensor(), Tensor()});
   }
 };
 

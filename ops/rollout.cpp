@@ -5,6 +5,7 @@
 #include <string>
 
 #include "ops/kernels/error.hpp"
+#include "ops/once_differentiable.hpp"
 #include "ops/tensor_check.hpp"
 
 namespace uniphy::ops {
@@ -156,7 +157,7 @@ class RolloutFunction : public torch::autograd::Function<RolloutFunction> {
         grad[4] = torch::tensor(all, torch::kFloat64);
       }
     });
-    return grad;
+    return once_differentiable("rollout", std::move(grad));
   }
 };
 
@@ -177,6 +178,11 @@ RolloutFrames rollout(const Tensor& x0, const Tensor& v0, const Tensor& C0, cons
   const Tensor F =
       F0.defined() ? checked("rollout", "F0", F0, type, {P, 3, 3})
                    : torch::eye(3, x.options().requires_grad(false)).expand({P, 3, 3}).contiguous();
+  const std::int64_t end = bodies.empty() ? 0 : bodies.back().end;
+  if (end != P) {
+    throw Error("rollout: bodies: expected the last one to end at particle " + std::to_string(P) +
+                ", found " + std::to_string(end));
+  }
   auto plan = c10::make_intrusive<Plan>();
   plan->bodies = bodies;
   for (RolloutBody& body : plan->bodies) body.parameters = Tensor();  // `packed` carries them

@@ -4,6 +4,7 @@
 
 #include "ops/kernels/law_table.hpp"
 #include "ops/material.hpp"
+#include "ops/once_differentiable.hpp"
 
 namespace uniphy::ops {
 
@@ -71,7 +72,7 @@ class Svd3Function : public torch::autograd::Function<Svd3Function> {
       backward_kernel<double>(saved[0], saved[1], saved[2], grad[0], grad[1], grad[2], grad_F);
     else
       backward_kernel<float>(saved[0], saved[1], saved[2], grad[0], grad[1], grad[2], grad_F);
-    return {grad_F};
+    return once_differentiable("svd3", {grad_F});
   }
 };
 

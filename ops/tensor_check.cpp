@@ -10,16 +10,12 @@ namespace uniphy::ops {
 
 using torch::Tensor;
 
-namespace {
-
 std::string describe(const Tensor& t) {
   if (!t.defined()) return "an undefined tensor";
   std::ostringstream s;
   s << t.sizes() << " " << t.scalar_type() << " on " << t.device();
   return s.str();
 }
-
-}  // namespace
 
 void check_tensor(const char* op, const char* name, const Tensor& t, torch::ScalarType dtype,
                   const std::vector<std::int64_t>& sizes) {

@@ -2,9 +2,13 @@
 
 #include <torch/types.h>
 
+#include <string>
 #include <vector>
 
 namespace uniphy::ops {
+
+/// Sizes, dtype and device, for messages.
+std::string describe(const torch::Tensor& t);
 
 /// A size that may be anything.
 inline constexpr std::int64_t kAnySize = -1;

@@ -25,7 +25,7 @@ void network_backward(const PackedMlp<T>& net, const T* constant, const T* in, T
 }
 
 /// The adjoint of isotropic_evaluate, recomputing its forward pass tile by tile. Overwrites
-/// grad_F_trial, adds to grad_C and to the accumulator (LearnedLaw::Accumulator's layout); the last
+/// grad_F_trial, adds to grad_C and to the accumulator (laid out as LearnedLaw says); the last
 /// two may be null.
 template <class T>
 inline void isotropic_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, View<const T> F_trial,

@@ -75,7 +75,5 @@ inline constexpr double kLeastViscosity = -0.2;  ///< of sinh(η̃)/b̄: the sha
 inline constexpr double kExponentLimit = 4;  ///< of outputs that are exponents of strain measures
 inline constexpr double kArgumentLimit = 30;  ///< of their |γ x| and |δ x|: float does not overflow
 inline constexpr double kFluidCap = -0.5;  ///< c₁ below which a material has no strength at all
-inline constexpr double kMinimumStretch =
-    0.05;  ///< singular values are clamped here before the log
 
 }  // namespace uniphy::kernels

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string>
 
+#include "ops/kernels/between_steps.hpp"
 #include "ops/kernels/error.hpp"
 #include "ops/kernels/rollout_engine.hpp"
 
@@ -102,6 +103,7 @@ std::ptrdiff_t Rollout<T>::run(ParticleState<T>& state, std::ptrdiff_t steps,
       if (!options.on_frame(options.first_step + done, frame)) break;
     }
     if (done == steps) break;
+    call_between_steps();
     if (done > 0 && done % kSortEvery == 0) {
       engine.store(state);
       engine.load(state);
@@ -153,6 +155,7 @@ void Rollout<T>::record(const ParticleState<T>& initial, std::ptrdiff_t steps, s
       if (frames_v != nullptr) std::copy(frame.v.begin(), frame.v.end(), frames_v + at);
     }
     if (done == steps) break;
+    call_between_steps();
     const std::ptrdiff_t until =
         std::min({steps, (done / segment + 1) * segment, (done / every + 1) * every});
     engine.advance(done, until - done);
@@ -178,6 +181,7 @@ RolloutGradient<T> Rollout<T>::adjoint(const RolloutTape<T>& tape, const T* grad
   RolloutEngine<T> engine(*this);
   const typename RolloutEngine<T>::FrameGradients frames{grad_x, grad_v, tape.every};
   for (std::ptrdiff_t k = static_cast<std::ptrdiff_t>(tape.checkpoints.size()) - 1; k >= 0; --k) {
+    call_between_steps();
     const std::ptrdiff_t first = k * tape.segment;
     const std::ptrdiff_t steps = std::min(tape.segment, tape.steps - first);
     engine.load(tape.checkpoints[k], steps);

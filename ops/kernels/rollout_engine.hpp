@@ -1,7 +1,6 @@
 #pragma once
 
-// Inside of rollout.cpp and rollout_adjoint.cpp: the particles of a roll-out in chunks, and the
-// loops over steps.
+// Inside of a roll-out: its particles in chunks, and the loops over steps.
 
 #include <algorithm>
 #include <vector>

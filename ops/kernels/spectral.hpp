@@ -1,5 +1,6 @@
 #pragma once
 
+#include "ops/kernels/minimum_stretch.hpp"
 #include "ops/kernels/svd3.hpp"
 
 // Isotropic functions of F and their adjoints by divided differences.
@@ -84,7 +85,8 @@ struct HenckyStrain {
 template <class V>
 UNIPHY_INLINE HenckyStrain<V> hencky_strain(const Vec3<V>& sigma, bool gradients) {
   using T = ScalarOf<V>;
-  const V floor(T(0.05)), one(T(1)), zero(T(0));
+  const T least = T(kMinimumStretch);
+  const V floor(least), one(T(1)), zero(T(0));
   HenckyStrain<V> h;
   for (int i = 0; i < 3; ++i) {
     h.stretch[i] = lane_max(floor, sigma[i]);

@@ -223,8 +223,7 @@ void g2p_adjoint(const GridSettings& settings, std::ptrdiff_t count, const T* x,
 
 namespace {
 
-/// Every node of the grid, layer by layer in parallel: [n,n,n,from_width] into a padded layer, the
-/// kernel on it, and [n,n,n,to_width] out of it.
+/// visit(layer, its nodes) for every layer of the grid, in parallel.
 template <class T, class Visit>
 void for_layers(int n, const Visit& visit) {
   const LayerBox whole{0, n, 0, n};

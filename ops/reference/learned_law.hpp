@@ -48,7 +48,7 @@ torch::Tensor learned_project(const LearnedLawTensors& law, const torch::Tensor&
 torch::Tensor learned_stress(const LearnedLawTensors& law, const torch::Tensor& F_proj,
                              const torch::Tensor& C, const torch::Tensor& z);
 
-// The isotropic form in steps, for training: everything that does not depend on z, the Hencky
+// The isotropic form in steps: everything that does not depend on z, the Hencky
 // strain H = U log(max(Σ, 0.05)) Uᵀ [P, 3, 3] (isotropic_tensors.hpp), can be computed once.
 
 /// What the projection network says of every particle, each [P].

@@ -130,6 +130,15 @@ TEST(MpmOps, ErrorsNameTheArgument) {
   outside[0] = good[0].clone();
   outside[0][3][1] = 0.99;
   EXPECT_THAT(message([&] { p2g_of(outside, s); }), ::testing::HasSubstr("particle 3 at"));
+  TensorList weightless = good;
+  weightless[4] = good[4].clone();
+  weightless[4][2] = 0;
+  EXPECT_THAT(
+      message([&] { p2g_of(weightless, s); }),
+      ::testing::HasSubstr("p2g: mass: expected positive numbers, found 0.000000 of particle 2"));
+  kernels::GridSettings impossible = s;
+  impossible.n = -1;
+  EXPECT_THAT(message([&] { p2g_of(good, impossible); }), ::testing::HasSubstr("found -1"));
 }
 
 }  // namespace

@@ -178,7 +178,8 @@ TEST(Rollout, ErrorsNameTheArgument) {
               HasSubstr("every >= 1"));
   EXPECT_THAT(message([](RolloutScene&, RolloutBody& b) { b.parameters = torch::ones({3}); }),
               HasSubstr("parameters of body 0: expected [2] Float on cpu, found [3] Float"));
-  EXPECT_THAT(message([](RolloutScene&, RolloutBody& b) { b.end = 100; }), HasSubstr("mass"));
+  EXPECT_THAT(message([](RolloutScene&, RolloutBody& b) { b.end = 100; }),
+              HasSubstr("bodies: expected the last one to end at particle 125, found 100"));
   EXPECT_THAT(message([](RolloutScene& s, RolloutBody&) { s.x = s.x + 0.4; }),
               HasSubstr("placed too close"));
 }

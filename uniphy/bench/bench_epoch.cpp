@@ -16,8 +16,6 @@ namespace {
 
 using torch::Tensor;
 
-constexpr std::int64_t kStride = 5;
-
 RigidMotion benchmark_motion() {
   RigidMotion motion;
   motion.centre = {0.5, 0.5, 0.5};
@@ -49,14 +47,14 @@ Observation observe(std::int64_t side, std::int64_t steps) {
                                          mass, o.volume);
   auto state = kernels::ParticleState<double>::undeformed(x, benchmark_motion().velocities(x));
   kernels::RunOptions<double> options;
-  options.every = kStride;
+  options.every = kEpochStride;
   options.on_frame = [&o](std::ptrdiff_t step, const kernels::ParticleState<double>& at) {
     o.x.insert(o.x.end(), at.x.begin(), at.x.end());
     o.time.push_back(static_cast<double>(step) * o.dt);
     ++o.frames;
     return true;
   };
-  rollout.run(state, steps / kStride * kStride, options);
+  rollout.run(state, steps, options);
   return o;
 }
 

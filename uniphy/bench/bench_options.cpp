@@ -1,6 +1,10 @@
 #include "uniphy/bench/bench_options.hpp"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
+#include <set>
 
 #include "ops/kernels/law.hpp"
 #include "ops/kernels/law_table.hpp"
@@ -10,6 +14,21 @@ namespace uniphy::bench {
 bool BenchOptions::measures(const std::string& subject) const {
   return std::find(subjects.begin(), subjects.end(), subject) != subjects.end();
 }
+
+namespace {
+
+std::vector<std::int64_t> sizes(Section& section, const std::vector<std::int64_t>& fallback,
+                                const Range& range, const std::string& doc) {
+  const auto all =
+      section.integers("particles", fallback, range, "", doc + ", each once", between(1, 20));
+  if (std::set<std::int64_t>(all.begin(), all.end()).size() < all.size()) {
+    section.fail("particles",
+                 fmt::format("expected different sizes, found {}", fmt::join(all, ", ")));
+  }
+  return all;
+}
+
+}  // namespace
 
 BenchOptions read_bench_options(Section& config) {
   BenchOptions o;
@@ -38,26 +57,30 @@ BenchOptions read_bench_options(Section& config) {
   o.law_particles = laws.integer("particles", 10000, between(1, 1e8), "", "of one call");
 
   Section learned = config.section("learned", "the learned law in both forms, random weights");
-  o.learned_particles = learned.integers("particles", std::vector<std::int64_t>{1000, 10000},
-                                         between(1, 1e8), "", "of one call", between(1, 20));
+  o.learned_particles = sizes(learned, {1000, 10000}, between(1, 1e8), "of one call");
 
   Section mpm = config.section("mpm", "P2G, grid and G2P in a roll-out, 8 particles a cell");
   o.mpm_particles =
-      mpm.integers("particles", std::vector<std::int64_t>{1000, 10000, 100000, 1000000},
-                   between(8, 1e8), "", "sizes of the body", between(1, 20));
+      sizes(mpm, {1000, 10000, 100000, 1000000}, between(8, 1e8), "sizes of the body");
   o.mpm_goal_particles =
       mpm.integer("goal_particles", 100000, between(8, 1e8), "",
                   "the size that the goals are about and that the plain version runs");
   o.mpm_steps = mpm.integer("steps", 32, between(1, 100000), "", "of one call");
-  if (!config.describing() && std::find(o.mpm_particles.begin(), o.mpm_particles.end(),
-                                        o.mpm_goal_particles) == o.mpm_particles.end()) {
-    mpm.fail("goal_particles",
-             "expected one of mpm.particles, found " + std::to_string(o.mpm_goal_particles));
+  if (!config.describing() && o.measures("mpm") &&
+      std::find(o.mpm_particles.begin(), o.mpm_particles.end(), o.mpm_goal_particles) ==
+          o.mpm_particles.end()) {
+    mpm.fail("goal_particles", fmt::format("expected one of mpm.particles, {}, found {}",
+                                           fmt::join(o.mpm_particles, ", "), o.mpm_goal_particles));
   }
 
   Section epoch = config.section("epoch", "one epoch of Algorithm 2 on the benchmark cube");
   o.epoch_side = epoch.integer("per_side", 10, between(2, 200), "", "particles along an edge");
-  o.epoch_steps = epoch.integer("steps", 1000, between(5, 1e6), "", "steps of 0.5 ms");
+  o.epoch_steps =
+      epoch.integer("steps", 1000, between(5, 1e6), "", "steps of 0.5 ms, a multiple of 5");
+  if (o.epoch_steps % kEpochStride != 0) {
+    epoch.fail("steps",
+               fmt::format("expected a multiple of {}, found {}", kEpochStride, o.epoch_steps));
+  }
   o.epoch_rounds = epoch.integer("rounds", 2, between(1, 1000), "", "times that it is measured");
   o.epoch_plain_steps =
       epoch.integer("plain_steps", 4, between(1, 1e6), "",

@@ -9,9 +9,12 @@
 
 namespace uniphy::bench {
 
+/// Steps of an epoch from frame to frame.
+inline constexpr std::int64_t kEpochStride = 5;
+
 /// What is measured, and how thoroughly. The defaults are what the goals are about.
 struct BenchOptions {
-  std::vector<std::string> subjects;  ///< of kSubjects
+  std::vector<std::string> subjects;
   Effort effort;
   std::int64_t copy_mb = 256;
 

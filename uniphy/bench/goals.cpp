@@ -94,7 +94,7 @@ std::vector<Goal> goals(const BenchReport& report, const BenchOptions& options) 
     g.push_back(
         {"second_core_min", "second core, least gain from 1e4 particles on", gain.low, 1.7, false});
   }
-  if (options.measures("mpm")) {
+  if (options.measures("mpm") && options.mpm_particles.size() > 1) {
     g.push_back({"per_particle_spread", "cost of a particle-step, largest size over smallest",
                  spread(report), 1.5, true});
   }

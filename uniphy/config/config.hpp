@@ -96,6 +96,10 @@ class Section {
   std::filesystem::path input_file(const std::string& key, Default<std::string> fallback,
                                    const std::string& doc);
 
+  /// The same of a file or a directory.
+  std::filesystem::path input_path(const std::string& key, Default<std::string> fallback,
+                                   const std::string& doc);
+
   /// A number, or `word` ("auto", "none"), which reads as nullopt. A nullopt default is the word.
   std::optional<double> real_or(const std::string& word, const std::string& key,
                                 Default<std::optional<double>> fallback, const Range& range,
@@ -159,6 +163,9 @@ class Section {
   };
 
   std::string full_path(const std::string& key) const;
+  /// `kind`: what is expected there.
+  std::filesystem::path existing_path(const std::string& key, const Default<std::string>& fallback,
+                                      const std::string& kind, const std::string& doc);
   /// Records one declaration; returns the resolved node to fill in.
   std::shared_ptr<Node> declare(const std::string& key, const Kind& kind,
                                 const std::string& fallback, const std::string& doc);

@@ -186,17 +186,29 @@ std::string Section::choice(const std::string& key, Default<std::string> fallbac
 
 std::filesystem::path Section::input_file(const std::string& key, Default<std::string> fallback,
                                           const std::string& doc) {
+  const std::filesystem::path name = existing_path(key, fallback, "file", doc);
+  std::error_code ignored;
+  if (!state_->describing && std::filesystem::is_directory(name, ignored)) {
+    fail(key, fmt::format("expected a file, found \"{}\", which is a directory", name.string()));
+  }
+  return name;
+}
+
+std::filesystem::path Section::input_path(const std::string& key, Default<std::string> fallback,
+                                          const std::string& doc) {
+  return existing_path(key, fallback, "file or directory", doc);
+}
+
+std::filesystem::path Section::existing_path(const std::string& key,
+                                             const Default<std::string>& fallback,
+                                             const std::string& kind, const std::string& doc) {
   const std::string name =
-      scalar<std::string>(key, fallback, {"file", "", ""}, doc, "", text_in, same_text);
+      scalar<std::string>(key, fallback, {kind, "", ""}, doc, "", text_in, same_text);
   if (state_->describing || (name.empty() && fallback.value && fallback.value->empty()))
     return name;
   std::error_code ignored;
-  const auto status = std::filesystem::status(name, ignored);
-  if (!std::filesystem::exists(status)) {
-    fail(key, fmt::format("expected a file, found \"{}\", which does not exist", name));
-  }
-  if (std::filesystem::is_directory(status)) {
-    fail(key, fmt::format("expected a file, found \"{}\", which is a directory", name));
+  if (!std::filesystem::exists(name, ignored)) {
+    fail(key, fmt::format("expected a {}, found \"{}\", which does not exist", kind, name));
   }
   return name;
 }

@@ -204,11 +204,9 @@ void identify(const IdentifyOptions& options, RunDirectory& out, Metrics& metric
       CaseResult found = taken_up_or_identified(options, material, *unknowns, fingerprint, out);
       row = found.row;
       pictures.push_back(std::move(found.pictures));
-    } catch (const Interrupted&) {
-      throw;
     } catch (const Error& error) {
       row.material = name;
-      row.fit_mse = row.resim_mse = kNan;
+      row.fit_mse = row.fit_share = row.other_best = row.resim_mse = row.resim_share = kNan;
       failures += fmt::format("; {}: {}", row.material, error.what());
     }
     add_row(metrics, row);
@@ -217,7 +215,7 @@ void identify(const IdentifyOptions& options, RunDirectory& out, Metrics& metric
   const std::string table = identify_table(rows);
   write_text_file(out.file("table.md"), table);
   std::fputs(table.c_str(), stdout);
-  draw_pictures(pictures, out);
+  if (!pictures.empty()) draw_pictures(pictures, out);
   if (!failures.empty()) {
     metrics.write(out.file("metrics.json"));
     throw Error(failures.substr(2));

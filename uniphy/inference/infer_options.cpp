@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "ops/kernels/error.hpp"
 
 namespace uniphy {
@@ -61,6 +64,9 @@ FitOptions read_fit_options(Section& config) {
                                 "found {}, {} and {} entries",
                                 horizon.size(), candidates.size(), epochs.size()));
     }
+    if (!std::is_sorted(candidates.rbegin(), candidates.rend())) {
+      schedule.fail("candidates", "expected numbers that do not grow: the best of a stage go on");
+    }
     if (horizon.back() != 1) {
       schedule.fail("horizon",
                     fmt::format("expected 1 in the last stage, found {}", horizon.back()));
@@ -92,8 +98,8 @@ UnknownsSource read_unknowns(Section& config) {
            source.ranges.clear();
            for (std::size_t k = 0; k < defaults.size(); ++k) {
              const std::string& name = kernels::parameter_names(id)[k];
-             source.ranges.push_back(s.interval(name, defaults[k], positive(),
-                                                parameter_unit(id, name),
+             const Range range = name == "theta" ? Range{0, M_PI / 2, true, true} : positive();
+             source.ranges.push_back(s.interval(name, defaults[k], range, parameter_unit(id, name),
                                                 "starts are drawn from here"));
            }
            source.starts = static_cast<int>(

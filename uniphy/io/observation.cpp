@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "ops/kernels/error.hpp"
 #include "uniphy/io/hdf5.hpp"
@@ -26,14 +27,27 @@ void check(const Observation& observation, const Fail& fail) {
                                 observation.time[i], observation.time[i - 1]));
     }
   }
+  double volumes = 0;
   for (const double volume : observation.volume) {
     if (!(volume > 0)) fail("/volume", fmt::format("expected volumes > 0, found {}", volume));
+    volumes += volume;
+  }
+  if (volumes > 1) {
+    fail("/volume",
+         fmt::format("expected a body that fits the unit cube, found {} m^3 in all", volumes));
+  }
+  for (std::size_t k = 0; k < observation.x.size(); ++k) {
+    if (observation.x[k] >= 0 && observation.x[k] <= 1) continue;
+    const std::size_t particle = k / 3, count = std::size_t(observation.particles);
+    fail("/x", fmt::format("expected positions inside the unit cube, found {} m of particle {} in "
+                           "frame {}",
+                           observation.x[k], particle % count, particle / count));
   }
   const auto scene = [&](bool good, const char* name, const std::string& message) {
     if (!good) fail(fmt::format("attribute {} of /scene", name), message);
   };
-  scene(observation.grid >= 8 && observation.grid <= 4096, "grid",
-        fmt::format("expected 8 to 4096 nodes, found {}", observation.grid));
+  scene(observation.grid >= 8 && observation.grid <= 1024, "grid",
+        fmt::format("expected 8 to 1024 nodes, found {}", observation.grid));
   scene(observation.dt > 0 && observation.dt < 1, "dt",
         fmt::format("expected a time step in (0, 1) s, found {}", observation.dt));
   scene(observation.walls == "freeslip" || observation.walls == "noslip", "walls",
@@ -106,9 +120,10 @@ Observation read_observation(const std::filesystem::path& file) {
   observation.time = reader.read<double>("time", {observation.frames}, hdf5::Values::finite);
   observation.volume = reader.read<double>("volume", {observation.particles}, hdf5::Values::finite);
   const auto integer = [&](const char* name) {
-    const std::int64_t value = reader.attribute_integer("scene", name);
-    // Out of int's range is out of every range that check() knows.
-    return value < -1 || value > 1 << 20 ? -1 : static_cast<int>(value);
+    // The nearest int is out of every range that check() knows, too.
+    return static_cast<int>(std::clamp<std::int64_t>(reader.attribute_integer("scene", name),
+                                                     std::numeric_limits<int>::min(),
+                                                     std::numeric_limits<int>::max()));
   };
   observation.grid = integer("grid");
   observation.dt = reader.attribute_real("scene", "dt");

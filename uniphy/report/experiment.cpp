@@ -4,8 +4,10 @@
 #include <omp.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <tuple>
 
 #include "ops/kernels/error.hpp"
 #include "uniphy/io/atomic_file.hpp"
@@ -87,6 +89,54 @@ CommandLine parse_command_line(int argc, const char* const* argv, const Experime
   return line;
 }
 
+/// Puts a directory back where a run failed before it had written anything: its configuration next
+/// to the products of an earlier one would be a lie, and so would a directory without any.
+class Undo {
+ public:
+  explicit Undo(std::filesystem::path directory) : directory_(std::move(directory)) {
+    for (auto d = std::filesystem::absolute(directory_).lexically_normal();
+         !std::filesystem::exists(d, ignored_) && d.has_relative_path(); d = d.parent_path()) {
+      made_.push_back(d);
+    }
+    for (const char* name : {kConfig, kMetrics}) {
+      if (std::filesystem::is_regular_file(directory_ / name, ignored_))
+        kept_.emplace_back(name, read_text_file(directory_ / name));
+    }
+  }
+  /// Call when the frame's own files have been written, and the work begins.
+  void begin() { before_ = listing(); }
+
+  void run() const {
+    if (listing() != before_) return;  // there are products: they need their configuration
+    std::filesystem::remove(directory_ / kConfig, ignored_);
+    for (const auto& [name, text] : kept_) write_text_file(directory_ / name, text);
+    for (const auto& d : made_) std::filesystem::remove(d, ignored_);  // if empty
+  }
+
+  static constexpr const char* kConfig = "config.yaml";
+  static constexpr const char* kMetrics = "metrics.json";
+
+ private:
+  using Entry = std::tuple<std::filesystem::path, std::filesystem::file_time_type, std::uintmax_t>;
+  std::vector<Entry> listing() const {
+    std::vector<Entry> all;
+    std::filesystem::recursive_directory_iterator at(directory_, ignored_), end;
+    for (; at != end; at.increment(ignored_)) {
+      const bool file = at->is_regular_file(ignored_);
+      all.emplace_back(at->path(), at->last_write_time(ignored_),
+                       file ? at->file_size(ignored_) : 0);
+    }
+    std::sort(all.begin(), all.end());
+    return all;
+  }
+
+  std::filesystem::path directory_;
+  std::vector<std::filesystem::path> made_;  ///< innermost first
+  std::vector<std::pair<std::string, std::string>> kept_;
+  std::vector<Entry> before_;
+  mutable std::error_code ignored_;
+};
+
 void run(const CommandLine& line, const ExperimentInfo& info, const DeclareFunction& declare,
          std::chrono::steady_clock::time_point start) {
   const Config config = Config::load(line.config, line.overrides);
@@ -95,20 +145,27 @@ void run(const CommandLine& line, const ExperimentInfo& info, const DeclareFunct
   config.finish();
 
   if (line.threads > 0) omp_set_num_threads(line.threads);
+  Undo undo(line.out);
   make_directory(line.out);
   const std::string resolved = config.resolved();
   RunDirectory out(line.out, resolved, omp_get_max_threads());
-  write_text_file(out.file("config.yaml"),
+  write_text_file(out.file(Undo::kConfig),
                   fmt::format("# {} {}\n{}", info.name, line.config, resolved));
   // Numbers of an earlier run would pass for those of this one if it fails.
   std::error_code ignored;
-  std::filesystem::remove(out.file("metrics.json"), ignored);
+  std::filesystem::remove(out.file(Undo::kMetrics), ignored);
+  undo.begin();
 
   catch_interrupts();
   Metrics metrics;
-  work(out, metrics);
+  try {
+    work(out, metrics);
+  } catch (...) {
+    undo.run();
+    throw;
+  }
   metrics.add_resources(start);
-  metrics.write(out.file("metrics.json"));
+  metrics.write(out.file(Undo::kMetrics));
 }
 
 }  // namespace
@@ -133,7 +190,9 @@ int run_experiment(int argc, const char* const* argv, const ExperimentInfo& info
   } catch (const std::bad_alloc&) {
     std::fprintf(stderr, "error: out of memory\n");
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "error: %s\n", error.what());
+    // LibTorch's errors go on with a stack trace, a frame a line.
+    const std::string text = error.what();
+    std::fprintf(stderr, "error: %s\n", text.substr(0, text.find('\n')).c_str());
   } catch (...) {
     std::fprintf(stderr, "error: unknown error\n");
   }

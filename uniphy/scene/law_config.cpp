@@ -40,8 +40,9 @@ Parameter parameter(LawId id, const std::string& name) {
 }
 
 void read_learned(Section& law, LawSource* source) {
-  source->model = law.text("model", std::string(),
-                           "model file (model.h5); may be absent where the latent file names it");
+  source->model =
+      law.input_file("model", std::string(),
+                     "model file (model.h5); may be absent where the latent file names it");
   Section latent = law.section("latent", "the latent code");
   latent.variant("type", std::string("code"),
                  {{"code", "one of the codes that the model was trained with",
@@ -58,8 +59,8 @@ void read_learned(Section& law, LawSource* source) {
                   {"fitted", "the result of uniphy_infer",
                    [&](Section& s) {
                      source->latent = LawSource::Latent::file;
-                     source->latent_file =
-                         s.text("path", required, "latent.h5, or the output folder that holds it");
+                     source->latent_file = s.input_path(
+                         "path", required, "latent.h5, or the output folder that holds it");
                    }}},
                  "where the latent code comes from");
   if (!law.describing() && source->model.empty() && source->latent != LawSource::Latent::file) {

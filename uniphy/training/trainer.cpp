@@ -1,12 +1,14 @@
 #include "uniphy/training/trainer.hpp"
 
 #include <ATen/CPUGeneratorImpl.h>
+#include <fmt/format.h>
 
 #include <chrono>
 #include <cmath>
 #include <limits>
 #include <optional>
 
+#include "ops/kernels/error.hpp"
 #include "uniphy/report/interrupt.hpp"
 #include "uniphy/report/progress.hpp"
 #include "uniphy/training/batches.hpp"
@@ -85,7 +87,15 @@ TrainingResult train(const Dataset& data, const TrainingOptions& o,
     const TrainingStep now =
         training_step(objective, result.networks, result.z,
                       sampler.rows(step, o.batch_per_trajectory), stage, o, optimizer);
-    if (step % kReportEvery == 0 || step + 1 == o.steps) {
+    const bool saves = (step + 1) % o.checkpoint_every == 0;
+    const bool reports = step % kReportEvery == 0 || step + 1 == o.steps;
+    if ((saves || reports) && !std::isfinite(now.loss.item<double>())) {
+      throw Error(
+          fmt::format("train: expected a finite loss, found {} at step {}: smaller "
+                      "training.learning_rate, training.latent_rate or training.clip?",
+                      now.loss.item<double>(), step));
+    }
+    if (reports) {
       result.history.push_back({step, now.loss.item<double>(), median_root(now.errors.stress),
                                 median_root(now.errors.projection)});
       TrainingPoint& p = result.history.back();
@@ -97,7 +107,7 @@ TrainingResult train(const Dataset& data, const TrainingOptions& o,
       }
       progress.update(step, note_of(p));
     }
-    if ((step + 1) % o.checkpoint_every == 0) save(step + 1);
+    if (saves) save(step + 1);
   }
   progress.finish();
   result.seconds = before + seconds_since(start);

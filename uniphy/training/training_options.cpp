@@ -14,6 +14,10 @@ TrainingOptions read_training_options(Section& config, const TrainingOptions& de
                    {"gelu", "silu", "squareplus"}, "of the hidden layers"));
   network.latent_size = model.integer("latent_size", network.latent_size, between(1, 256), "",
                                       "numbers in a latent code");
+  if (network.form == kernels::LawForm::isotropic && network.latent_size < 2 &&
+      !config.describing()) {
+    model.fail("latent_size", "expected 2 or more: form isotropic takes its scales from two");
+  }
   network.hidden_layers =
       model.integer("hidden_layers", network.hidden_layers, between(0, 16), "", "of each network");
   const auto answers_to_state = [&model](const char* key, bool state, const char* what) {
@@ -35,17 +39,18 @@ TrainingOptions read_training_options(Section& config, const TrainingOptions& de
   options.batch_per_trajectory =
       t.integer("batch_per_trajectory", options.batch_per_trajectory, between(1, 65536), "samples",
                 "of every trajectory in a step");
-  options.learning_rate = t.real("learning_rate", options.learning_rate, positive(), "",
+  options.learning_rate = t.real("learning_rate", options.learning_rate, Range{0, 1, true}, "",
                                  "of the networks; falls to zero along a cosine");
-  options.latent_rate =
-      t.real("latent_rate", options.latent_rate, positive(), "", "times learning_rate, for z");
-  options.weight_decay = t.real("weight_decay", options.weight_decay, at_least(0), "", "of AdamW");
+  options.latent_rate = t.real("latent_rate", options.latent_rate, Range{0, 1e6, true}, "",
+                               "times learning_rate, for z");
+  options.weight_decay =
+      t.real("weight_decay", options.weight_decay, between(0, 100), "", "of AdamW");
   options.latent_sigma =
-      t.real("latent_sigma", options.latent_sigma, positive(), "", "width of the prior of z");
+      t.real("latent_sigma", options.latent_sigma, Range{1e-6, 1e6}, "", "width of the prior of z");
   options.error_floor = t.real("error_floor", options.error_floor, positive(), "",
                                "errors are relative to a sample's own size plus this share of "
                                "the trajectory's RMS");
-  options.delta = t.real("delta", options.delta, positive(), "",
+  options.delta = t.real("delta", options.delta, Range{1e-12, 1e12}, "",
                          "squared relative error below which the logarithm is linear");
   options.clip = t.real("clip", options.clip, positive(), "", "largest gradient norm");
   options.checkpoint_every =

@@ -88,10 +88,12 @@ TEST(Bench, RefusesBadKeys) {
     const char* message;
   } cases[] = {{"round=3", "round: unknown key"},
                {"mpm.sizes=[8]", "mpm.sizes: unknown key"},
-               {"subjects=[svd, speed]", "speed"},
+               {"subjects=[svd, speed]", "found \"speed\""},
                {"rounds=0", "rounds: expected an integer in [1, 1000]"},
                {"learned.particles=[0]", "learned.particles"},
-               {"mpm.goal_particles=8", "mpm.goal_particles: expected one of mpm.particles"}};
+               {"learned.particles=[8, 8]", "learned.particles: expected different sizes"},
+               {"epoch.steps=9", "epoch.steps: expected a multiple of 5, found 9"},
+               {"mpm.goal_particles=8", "mpm.goal_particles: expected one of mpm.particles, "}};
   for (const auto& c : cases) {
     const Result result = run(scratch, {c.set});
     EXPECT_EQ(result.code, 1) << c.set;
@@ -104,6 +106,7 @@ TEST(Bench, GoalsComeFromTheRightRows) {
   options.subjects = {"svd", "mpm"};
   options.svd_matrices = 100000;
   options.mpm_goal_particles = 100000;
+  options.mpm_particles = {1000, 100000};
   BenchReport report;
   report.machine.fma_core = 100;
   report.machine.threads = 2;

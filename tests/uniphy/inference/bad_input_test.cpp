@@ -76,7 +76,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadObservation{"ThickWalls", [](Observation& o) { o.bound = 9; }, "attribute bound"},
         BadObservation{"NoDensity", [](Observation& o) { o.density = -1; }, "expected a density"},
         BadObservation{"ManyStepsAway", [](Observation& o) { o.time[3] = 1e9; },
-                       "expected frames at whole multiples"}),
+                       "expected at most 10000000 time steps"}),
     [](const auto& info) { return std::string(info.param.name); });
 
 TEST(BadObservationPlace, ABodyOutsideTheGridIsRefusedWithItsParticle) {

@@ -63,7 +63,7 @@ TEST(Observation, ImpossibleValuesAreRefused) {
     std::function<void(Observation&)> spoil;
   };
   const Case cases[] = {
-      {"o.h5: attribute grid of /scene: expected 8 to 4096 nodes, found 4",
+      {"o.h5: attribute grid of /scene: expected 8 to 1024 nodes, found 4",
        [](Observation& o) { o.grid = 4; }},
       {"o.h5: attribute dt of /scene: expected a time step in (0, 1) s, found 0",
        [](Observation& o) { o.dt = 0; }},
@@ -77,6 +77,10 @@ TEST(Observation, ImpossibleValuesAreRefused) {
        [](Observation& o) { o.gravity[2] = std::nan(""); }},
       {"o.h5: /time: expected increasing times, found 0.1 s after 0.1 s",
        [](Observation& o) { o.time[2] = 0.1; }},
+      {"o.h5: /x: expected positions inside the unit cube, found -0.1 m of particle 1 in frame 2",
+       [](Observation& o) { o.x[16] = -0.1; }},
+      {"o.h5: /volume: expected a body that fits the unit cube, found 2.000002 m^3 in all",
+       [](Observation& o) { o.volume[0] = 2; }},
       {"o.h5: /volume: expected volumes > 0, found 0", [](Observation& o) { o.volume[0] = 0; }},
       {"o.h5: /x: expected 18 numbers for the shape [3, 2, 3], found 17",
        [](Observation& o) { o.x.pop_back(); }},
@@ -102,7 +106,7 @@ TEST(Observation, MalformedFilesAreRefused) {
   };
   const hdf5::Info info{"m", ""};
   const Case cases[] = {
-      {"o.h5: attribute grid of /scene: expected 8 to 4096 nodes, found -1",
+      {"o.h5: attribute grid of /scene: expected 8 to 1024 nodes, found 2147483647",
        [](hdf5::Writer& w) { w.attribute("scene", "grid", std::int64_t{1} << 40); }},
       {"o.h5: attribute dt of /scene: expected floating-point numbers, found int64",
        [](hdf5::Writer& w) { w.attribute("scene", "dt", 1); }},

@@ -36,6 +36,10 @@ RunFunction add(Section& config) {
   const double b = config.real("b", required, any_number(), "m", "the second number");
   return [=](RunDirectory& out, Metrics& metrics) {
     if (a + b > 1000) throw Error("the sum is too large");
+    if (a + b == 999) {
+      write_text_file(out.file("half.txt"), "half");
+      throw Error("half of it");
+    }
     if (a + b < -1000) throw std::runtime_error("not even an Error");
     write_text_file(out.file("sum.txt"), std::to_string(a + b));
     metrics.set("sum", a + b);
@@ -165,12 +169,27 @@ TEST(Experiment, RefusedConfigurationLeavesNoDirectory) {
   EXPECT_FALSE(std::filesystem::exists(scratch.file("out")));
 }
 
-TEST(Experiment, FailedRunLeavesNoMetricsOfAnEarlierOne) {
+TEST(Experiment, ARunThatFailsAfterItWroteLeavesNoMetricsOfAnEarlierOne) {
   const testing::Scratch scratch;
   scratch.write("c.yaml", "b: 2\n");
   EXPECT_EQ(run(scratch, {"@/c.yaml", "--out", "@/out"}).code, 0);
-  EXPECT_EQ(run(scratch, {"@/c.yaml", "--out", "@/out", "--set", "a=9999"}).code, 1);
+  EXPECT_EQ(run(scratch, {"@/c.yaml", "--out", "@/out", "--set", "a=997"}).code, 1);
   EXPECT_FALSE(std::filesystem::exists(scratch.file("out/metrics.json")));
+  EXPECT_THAT(read_text_file(scratch.file("out/config.yaml")), HasSubstr("a: 997"));
+}
+
+TEST(Experiment, ARunThatFailsBeforeItWroteLeavesTheDirectoryAsItWas) {
+  const testing::Scratch scratch;
+  scratch.write("c.yaml", "b: 2\n");
+  EXPECT_EQ(run(scratch, {"@/c.yaml", "--out", "@/out"}).code, 0);
+  const std::string config = read_text_file(scratch.file("out/config.yaml"));
+  const std::string metrics = read_text_file(scratch.file("out/metrics.json"));
+  EXPECT_EQ(run(scratch, {"@/c.yaml", "--out", "@/out", "--set", "a=9999"}).code, 1);
+  EXPECT_EQ(read_text_file(scratch.file("out/config.yaml")), config);
+  EXPECT_EQ(read_text_file(scratch.file("out/metrics.json")), metrics);
+  // And one that was not there is not there.
+  EXPECT_EQ(run(scratch, {"@/c.yaml", "--out", "@/new/deep", "--set", "a=9999"}).code, 1);
+  EXPECT_FALSE(std::filesystem::exists(scratch.file("new")));
 }
 
 /// Starts a run that never ends on its own, sends the signals, and returns its wait status.

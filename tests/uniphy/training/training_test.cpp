@@ -258,6 +258,22 @@ TEST_F(TrainingTest, RefusesForeignAndDamagedCheckpoints) {
   EXPECT_THAT(message(data), ::testing::HasSubstr("expected a training checkpoint"));
 }
 
+TEST_F(TrainingTest, ADivergedTrainingStopsAndKeepsTheLastGoodCheckpoint) {
+  TrainingOptions options = small_options();
+  options.learning_rate = 1;
+  options.latent_rate = 1e6;
+  options.steps = 400;
+  options.checkpoint_every = 50;
+  std::string error;
+  try {
+    train(small_data(40, 1), options, directory_ / "c.pt");
+  } catch (const Error& e) {
+    error = e.what();
+  }
+  EXPECT_THAT(error, ::testing::HasSubstr("expected a finite loss"));
+  EXPECT_THAT(error, ::testing::HasSubstr("training.latent_rate"));
+}
+
 TEST(Errors, MediansByMaterialWithTheWorst) {
   Dataset data;
   for (const char* material : {"sand", "elastic", "sand", "sand", "sand", "elastic"}) {
