@@ -90,6 +90,11 @@ INSTANTIATE_TEST_SUITE_P(
                   "batch_per_trajectory, learning_rate, latent_rate, weight_decay, latent_sigma, "
                   "error_floor, delta, clip, checkpoint_every"},
         BadConfig{
+            "OneLatentNumber", ablation_stage,
+            "variants:\n  - {name: a, model: {latent_size: 1}}\n",
+            "c.yaml:2: variants.0.model.latent_size: expected 2 or more: form isotropic takes "
+            "its scales from two"},
+        BadConfig{
             "UnknownForm", ablation_stage, "variants:\n  - {name: a, model: {form: cubic}}\n",
             "c.yaml:2: variants.0.model.form: expected one of isotropic, seed, found \"cubic\""},
         BadConfig{"UnknownBudget", ablation_stage,
