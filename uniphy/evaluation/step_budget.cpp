@@ -1,6 +1,7 @@
 #include "uniphy/evaluation/step_budget.hpp"
 
 #include <algorithm>
+#include <cstdint>
 #include <cmath>
 
 namespace uniphy {

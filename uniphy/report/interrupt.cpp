@@ -5,6 +5,7 @@
 
 #include <atomic>
 #include <csignal>
+#include <cstdint>
 
 #include "ops/kernels/between_steps.hpp"
 
