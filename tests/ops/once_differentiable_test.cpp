@@ -7,6 +7,7 @@
 #include <torch/torch.h>
 
 #include <functional>
+#include <ostream>
 
 #include "ops/g2p.hpp"
 #include "ops/grid_update.hpp"
@@ -40,6 +41,7 @@ struct OpCase {
   int rank;  ///< 3: [P, 3, 3], 2: [P, 3], 4: a grid
   std::function<Tensor(const Tensor&)> op;
 };
+void PrintTo(const OpCase& c, std::ostream* out) { *out << c.name; }
 
 Tensor matrices() {
   return torch::eye(3, torch::kFloat64).expand({kParticles, 3, 3}) +

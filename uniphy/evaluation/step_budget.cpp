@@ -1,8 +1,8 @@
 #include "uniphy/evaluation/step_budget.hpp"
 
 #include <algorithm>
-#include <cstdint>
 #include <cmath>
+#include <cstdint>
 
 namespace uniphy {
 namespace {
