@@ -9,7 +9,7 @@
 namespace uniphy {
 
 /// More particles than this in one body is taken for a slip of the pen.
-inline constexpr std::int64_t kMaximumParticles = 100'000'000;
+inline constexpr std::int64_t kMaximumParticles = 10'000'000;
 
 /// The lattice over the bounds of a solid that has `per_side` cells along the longest side. Cells
 /// are as near to cubes as whole numbers along the other sides allow; particles stand at the

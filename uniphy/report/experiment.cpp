@@ -1,10 +1,14 @@
 #include "uniphy/report/experiment.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <omp.h>
+#include <sys/file.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
 #include <cstdio>
 #include <tuple>
@@ -137,6 +141,27 @@ class Undo {
   mutable std::error_code ignored_;
 };
 
+/// Held while a run writes to its directory: two of them would take each other's files.
+class DirectoryLock {
+ public:
+  explicit DirectoryLock(const std::filesystem::path& directory)
+      : file_(::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
+    // Some network file systems know no locks; that is no reason to refuse them.
+    if (file_ < 0 || ::flock(file_, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) return;
+    ::close(file_);
+    throw Error(directory.string() +
+                ": expected a directory of this run alone, found another process at work there");
+  }
+  ~DirectoryLock() {
+    if (file_ >= 0) ::close(file_);
+  }
+  DirectoryLock(const DirectoryLock&) = delete;
+  DirectoryLock& operator=(const DirectoryLock&) = delete;
+
+ private:
+  int file_;
+};
+
 void run(const CommandLine& line, const ExperimentInfo& info, const DeclareFunction& declare,
          std::chrono::steady_clock::time_point start) {
   const Config config = Config::load(line.config, line.overrides);
@@ -147,6 +172,7 @@ void run(const CommandLine& line, const ExperimentInfo& info, const DeclareFunct
   if (line.threads > 0) omp_set_num_threads(line.threads);
   Undo undo(line.out);
   make_directory(line.out);
+  const DirectoryLock lock(line.out);
   const std::string resolved = config.resolved();
   RunDirectory out(line.out, resolved, omp_get_max_threads());
   write_text_file(out.file(Undo::kConfig),

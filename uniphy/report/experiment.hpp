@@ -16,7 +16,7 @@
 //
 // DIR receives config.yaml (resolved: every default filled in) before the work starts, the
 // products, and metrics.json (with wall_s and peak_memory_mb) when it ends well. A run that fails
-// before it has written anything leaves DIR as it found it.
+// before it has written anything leaves DIR as it found it. A DIR belongs to one run at a time.
 
 #include <filesystem>
 #include <functional>

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "ops/kernels/error.hpp"
+#include "uniphy/geometry/fill.hpp"
 #include "uniphy/geometry/shapes/blobby.hpp"
 #include "uniphy/geometry/shapes/box.hpp"
 #include "uniphy/geometry/shapes/capped_cone.hpp"
@@ -201,7 +202,7 @@ Filling read_filling(Section& section) {
       {{"lattice", "cubic lattice with about so many particles",
         [&](Section& s) {
           filling.kind = Filling::Kind::lattice;
-          filling.count = s.integer("particles", 1000, between(1, 1e8), "",
+          filling.count = s.integer("particles", 1000, between(1, double(kMaximumParticles)), "",
                                     "wanted number, met as nearly as a lattice allows");
         }},
        {"per_side", "cubic lattice with so many cells along the longest side",
@@ -217,7 +218,8 @@ Filling read_filling(Section& section) {
        {"random", "uniformly random points",
         [&](Section& s) {
           filling.kind = Filling::Kind::random;
-          filling.count = s.integer("particles", 1000, between(1, 1e8), "", "number, met exactly");
+          filling.count = s.integer("particles", 1000, between(1, double(kMaximumParticles)), "",
+                                    "number, met exactly");
           filling.seed =
               static_cast<std::uint64_t>(s.integer("seed", 1, at_least(0), "", "draws the points"));
         }}},

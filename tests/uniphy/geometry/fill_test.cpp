@@ -118,7 +118,7 @@ TEST(UniformRandom, MappingsKeepTheirRanges) {
 TEST(Fill, RefusesNumbersThatMakeNoSense) {
   const Sphere sphere(0.5);
   EXPECT_THAT(error_of([&] { fill_lattice(sphere, 0); }), HasSubstr("at least 1 particle a side"));
-  EXPECT_THAT(error_of([&] { fill_lattice(sphere, 1000); }), HasSubstr("at most 100000000"));
+  EXPECT_THAT(error_of([&] { fill_lattice(sphere, 1000); }), HasSubstr("at most 10000000"));
   EXPECT_THAT(error_of([&] { fill_lattice_nearest(sphere, 0); }), HasSubstr("at least 1 particle"));
   EXPECT_THAT(error_of([&] { fill_lattice_spacing(sphere, -1); }), HasSubstr("positive spacing"));
   EXPECT_THAT(error_of([&] { fill_random(sphere, 0, 1); }), HasSubstr("found 0"));

@@ -192,6 +192,29 @@ TEST(Experiment, ARunThatFailsBeforeItWroteLeavesTheDirectoryAsItWas) {
   EXPECT_FALSE(std::filesystem::exists(scratch.file("new")));
 }
 
+TEST(Experiment, ADirectoryBelongsToOneRunAtATime) {
+  const testing::Scratch scratch;
+  scratch.write("c.yaml", "b: 2\n");
+  int inner = 0;
+  std::string config;
+  EXPECT_EQ(
+      run(scratch, {"@/c.yaml", "--out", "@/out"},
+          [&](Section& section) -> RunFunction {
+            section.real("b", required, any_number(), "m", "unused");
+            return [&](RunDirectory& out, Metrics&) {
+              config = read_text_file(out.file("config.yaml"));
+              const std::string file = scratch.file("c.yaml").string();
+              const char* argv[] = {"uniphy_example", file.c_str(), "--out", out.root().c_str()};
+              inner = run_experiment(4, argv, kInfo, add);
+              EXPECT_EQ(read_text_file(out.file("config.yaml")), config);
+            };
+          })
+          .code,
+      0);
+  EXPECT_EQ(inner, 1);
+  EXPECT_EQ(run(scratch, {"@/c.yaml", "--out", "@/out"}).code, 0);
+}
+
 /// Starts a run that never ends on its own, sends the signals, and returns its wait status.
 int status_after(const testing::Scratch& scratch, const std::vector<int>& signals, bool polls) {
   const pid_t child = ::fork();
