@@ -2,7 +2,6 @@
 
 #include <torch/torch.h>
 
-#include <sstream>
 #include <string>
 #include <utility>
 
