@@ -2,7 +2,6 @@
 
 #include <torch/torch.h>
 
-#include "ops/kernels/error.hpp"
 #include "ops/kernels/transfers.hpp"
 #include "ops/once_differentiable.hpp"
 #include "ops/saved_grid.hpp"
@@ -58,17 +57,6 @@ class P2gFunction : public torch::autograd::Function<P2gFunction> {
   }
 };
 
-/// The adjoint divides by them, and the motion does, too.
-void check_positive(const char* name, const Tensor& t) {
-  torch::NoGradGuard no_grad;
-  const Tensor bad = torch::nonzero((t > 0).logical_not());
-  if (bad.size(0) == 0) return;
-  const auto particle = bad[0][0].item<std::int64_t>();
-  throw Error(std::string("p2g: ") + name + ": expected positive numbers, found " +
-              std::to_string(t[particle].item<double>()) + " of particle " +
-              std::to_string(particle));
-}
-
 }  // namespace
 
 Tensor p2g(const Tensor& x, const Tensor& v, const Tensor& C, const Tensor& tau, const Tensor& mass,
@@ -77,13 +65,10 @@ Tensor p2g(const Tensor& x, const Tensor& v, const Tensor& C, const Tensor& tau,
   const auto type = real_type("p2g", "x", x);
   const Tensor positions = checked("p2g", "x", x, type, {kAnySize, 3});
   const std::int64_t P = x.size(0);
-  const Tensor m = checked("p2g", "mass", mass, type, {P});
-  const Tensor V = checked("p2g", "volume", volume, type, {P});
-  check_positive("mass", m);
-  check_positive("volume", V);
-  return P2gFunction::apply(positions, checked("p2g", "v", v, type, {P, 3}),
-                            checked("p2g", "C", C, type, {P, 3, 3}),
-                            checked("p2g", "tau", tau, type, {P, 3, 3}), m, V, settings);
+  return P2gFunction::apply(
+      positions, checked("p2g", "v", v, type, {P, 3}), checked("p2g", "C", C, type, {P, 3, 3}),
+      checked("p2g", "tau", tau, type, {P, 3, 3}), checked("p2g", "mass", mass, type, {P}),
+      checked("p2g", "volume", volume, type, {P}), settings);
 }
 
 }  // namespace uniphy::ops

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "ops/kernels/between_steps.hpp"
+#include "ops/kernels/check_positive.hpp"
 #include "ops/kernels/error.hpp"
 #include "ops/kernels/rollout_engine.hpp"
 
@@ -20,15 +21,6 @@ void check_size(const char* name, const std::vector<T>& values, std::ptrdiff_t e
   if (static_cast<std::ptrdiff_t>(values.size()) == expected) return;
   throw Error(std::string("roll-out: expected ") + std::to_string(expected) + " numbers in " +
               name + ", found " + std::to_string(values.size()));
-}
-
-template <class T>
-void check_positive(const char* name, const std::vector<T>& values) {
-  for (std::size_t p = 0; p < values.size(); ++p) {
-    if (values[p] > 0 && std::isfinite(values[p])) continue;
-    throw Error("roll-out: expected a positive " + std::string(name) + " of particle " +
-                std::to_string(p) + ", found " + std::to_string(values[p]));
-  }
 }
 
 template <class T>
@@ -73,8 +65,8 @@ Rollout<T>::Rollout(const GridSettings& grid, std::vector<BodyRange<T>> bodies, 
   const std::ptrdiff_t expected = bodies_.empty() ? 0 : bodies_.back().end;
   check_size("mass", mass_, expected);
   check_size("volume", volume_, expected);
-  check_positive("mass", mass_);
-  check_positive("volume", volume_);
+  check_positive("roll-out", "mass", mass_.data(), expected);
+  check_positive("roll-out", "volume", volume_.data(), expected);
   std::vector<ParticleRange> ranges;
   for (const auto& body : bodies_) ranges.emplace_back(body.begin, body.end);
   ParticleOrder{ranges};  // refuses ranges that do not fit

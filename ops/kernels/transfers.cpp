@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "ops/kernels/aligned_buffer.hpp"
+#include "ops/kernels/check_positive.hpp"
 #include "ops/kernels/error.hpp"
 #include "ops/kernels/grid_plan.hpp"
 #include "ops/kernels/mpm_table.hpp"
@@ -134,6 +135,8 @@ class Transfer {
 
 template <class T>
 void p2g(const GridSettings& settings, const ParticleArrays<T>& p, T* grid) {
+  check_positive("p2g", "mass", p.mass, p.count);
+  check_positive("p2g", "volume", p.volume, p.count);
   Transfer<T> t(settings, p.count, p.x);
   t.load(p.v, 3, kPlaneV);
   t.load(p.C, 9, kPlaneC);

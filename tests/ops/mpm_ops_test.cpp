@@ -133,9 +133,8 @@ TEST(MpmOps, ErrorsNameTheArgument) {
   TensorList weightless = good;
   weightless[4] = good[4].clone();
   weightless[4][2] = 0;
-  EXPECT_THAT(
-      message([&] { p2g_of(weightless, s); }),
-      ::testing::HasSubstr("p2g: mass: expected positive numbers, found 0.000000 of particle 2"));
+  EXPECT_THAT(message([&] { p2g_of(weightless, s); }),
+              ::testing::HasSubstr("p2g: expected a positive mass of particle 2, found 0.000000"));
   kernels::GridSettings impossible = s;
   impossible.n = -1;
   EXPECT_THAT(message([&] { p2g_of(good, impossible); }), ::testing::HasSubstr("found -1"));

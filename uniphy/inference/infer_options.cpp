@@ -3,20 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "ops/kernels/error.hpp"
+#include "uniphy/scene/law_config.hpp"
 
 namespace uniphy {
-namespace {
-
-const char* parameter_unit(kernels::LawId id, const std::string& name) {
-  if (name == "theta") return "rad";
-  return name == "eta" || (name == "mu" && id == kernels::LawId::newtonian) ? "Pa s" : "Pa";
-}
-
-}  // namespace
-
 FitOptions read_fit_options(Section& config) {
   FitOptions options;
   options.dtype = config.choice("dtype", std::string("float32"), {"float32", "float64"},
@@ -98,9 +89,10 @@ UnknownsSource read_unknowns(Section& config) {
            source.ranges.clear();
            for (std::size_t k = 0; k < defaults.size(); ++k) {
              const std::string& name = kernels::parameter_names(id)[k];
-             const Range range = name == "theta" ? Range{0, M_PI / 2, true, true} : positive();
-             source.ranges.push_back(s.interval(name, defaults[k], range, parameter_unit(id, name),
-                                                "starts are drawn from here"));
+             LawParameterKey key = law_parameter_key(id, name);
+             key.range.low_open = true;  // they are fitted as logarithms
+             source.ranges.push_back(
+                 s.interval(name, defaults[k], key.range, key.unit, "starts are drawn from here"));
            }
            source.starts = static_cast<int>(
                s.integer("starts", 100, between(1, 100000), "", "points that are tried first"));

@@ -187,7 +187,10 @@ void run(const CommandLine& line, const ExperimentInfo& info, const DeclareFunct
   try {
     work(out, metrics);
   } catch (...) {
-    undo.run();
+    try {
+      undo.run();
+    } catch (const Error&) {  // what ended the run is what the user has to hear of
+    }
     throw;
   }
   metrics.add_resources(start);

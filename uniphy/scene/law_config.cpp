@@ -9,19 +9,11 @@
 #include "uniphy/io/model_file.hpp"
 
 namespace uniphy {
-namespace {
 
 using kernels::LawDescription;
 using kernels::LawId;
 
-struct Parameter {
-  double LawDescription::*member;
-  Range range;
-  const char* unit;
-  const char* doc;
-};
-
-Parameter parameter(LawId id, const std::string& name) {
+LawParameterKey law_parameter_key(LawId id, const std::string& name) {
   if (name == "mu") {
     if (id == LawId::newtonian) {
       return {&LawDescription::mu, positive(), "Pa s", "dynamic viscosity"};
@@ -38,6 +30,8 @@ Parameter parameter(LawId id, const std::string& name) {
   }
   return {&LawDescription::eta, at_least(0), "Pa s", "viscosity of the plastic flow"};
 }
+
+namespace {
 
 void read_learned(Section& law, LawSource* source) {
   source->model =
@@ -108,7 +102,7 @@ LawSource read_law(Section& law) {
     variants.push_back({kernels::law_name(id), docs[i], [&source, id](Section& s) {
                           source.description.id = id;
                           for (const std::string& name : kernels::parameter_names(id)) {
-                            const Parameter p = parameter(id, name);
+                            const LawParameterKey p = law_parameter_key(id, name);
                             source.description.*p.member =
                                 s.real(name, required, p.range, p.unit, p.doc);
                           }

@@ -31,6 +31,15 @@ struct LawSource {
   kernels::LawDescription load() const;
 };
 
+/// How a parameter of an analytic law (kernels::parameter_names) is read.
+struct LawParameterKey {
+  double kernels::LawDescription::*member;
+  Range range;
+  const char* unit;
+  const char* doc;
+};
+LawParameterKey law_parameter_key(kernels::LawId id, const std::string& name);
+
 /// Declares and reads the keys of a law: `type` and, beside it, the parameters of that law.
 LawSource read_law(Section& law);
 

@@ -39,6 +39,19 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
+/// A step with a finite loss may be the one that leads to numbers that are not: what is saved and
+/// what is returned is looked at itself.
+void check_finite(const TrainingResult& result, std::int64_t steps) {
+  bool finite = result.z.isfinite().all().item<bool>();
+  for (const Tensor& p : result.networks.parameters())
+    finite = finite && p.isfinite().all().item<bool>();
+  if (finite) return;
+  throw Error(
+      fmt::format("train: expected finite weights and codes, found others after {} steps: smaller "
+                  "training.learning_rate, training.latent_rate or training.clip?",
+                  steps));
+}
+
 std::string note_of(const TrainingPoint& p) {
   char note[128];
   int length = std::snprintf(note, sizeof note, "loss %.4f, stress %.2e, projection %.2e", p.loss,
@@ -69,6 +82,7 @@ TrainingResult train(const Dataset& data, const TrainingOptions& o,
   std::int64_t step = state.load();
   const double before = result.seconds;
   const auto save = [&](std::int64_t at) {
+    check_finite(result, at);
     result.seconds = before + seconds_since(start);
     state.save(at);
   };
@@ -87,15 +101,8 @@ TrainingResult train(const Dataset& data, const TrainingOptions& o,
     const TrainingStep now =
         training_step(objective, result.networks, result.z,
                       sampler.rows(step, o.batch_per_trajectory), stage, o, optimizer);
-    const bool saves = (step + 1) % o.checkpoint_every == 0;
-    const bool reports = step % kReportEvery == 0 || step + 1 == o.steps;
-    if ((saves || reports) && !std::isfinite(now.loss.item<double>())) {
-      throw Error(
-          fmt::format("train: expected a finite loss, found {} at step {}: smaller "
-                      "training.learning_rate, training.latent_rate or training.clip?",
-                      now.loss.item<double>(), step));
-    }
-    if (reports) {
+    if (step % kReportEvery == 0 || step + 1 == o.steps) {
+      check_finite(result, step + 1);
       result.history.push_back({step, now.loss.item<double>(), median_root(now.errors.stress),
                                 median_root(now.errors.projection)});
       TrainingPoint& p = result.history.back();
@@ -107,7 +114,7 @@ TrainingResult train(const Dataset& data, const TrainingOptions& o,
       }
       progress.update(step, note_of(p));
     }
-    if (saves) save(step + 1);
+    if ((step + 1) % o.checkpoint_every == 0) save(step + 1);
   }
   progress.finish();
   result.seconds = before + seconds_since(start);
