@@ -8,9 +8,9 @@ namespace uniphy::kernels {
 // autograd wrappers call. Whole roll-outs go through Rollout, which keeps everything in place
 // between the parts. Grids are [n,n,n,4] (momentum, mass) or [n,n,n,3] (velocity); particles x, v
 // [P,3], C, tau [P,9], mass, volume [P]. Units and formulas: p2g.hpp, grid_update.hpp, g2p.hpp.
-// The same bits on any number of threads. A stencil that leaves the grid is an Error that names the
-// particle and its position. Null pointers among gradients mean absent (inputs) or not wanted
-// (outputs); outputs are overwritten.
+// The same bits on any number of threads. A stencil that leaves the grid, or a mass or volume that
+// is not positive, is an Error that names the particle. Null pointers among gradients mean absent
+// (inputs) or not wanted (outputs); outputs are overwritten.
 
 template <class T>
 struct ParticleArrays {
