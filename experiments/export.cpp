@@ -9,7 +9,7 @@
 
 #include "models/script_check.hpp"
 #include "models/torchscript.hpp"
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "uniphy/io/model_file.hpp"
 #include "uniphy/report/experiment.hpp"
 

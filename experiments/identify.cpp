@@ -6,7 +6,7 @@ int main(int argc, char** argv) {
   const uniphy::ExperimentInfo info{
       "uniphy_identify",
       "The whole job for objects of undisclosed material: observe one, find the latent code that "
-      "explains its motion, and foretell another shape at another velocity. An interrupted run "
+      "explains its motion, and predict another shape at another velocity. An interrupted run "
       "goes on with the materials that it has finished.",
       {"CONFIG.yaml              the scenes and the fit",
        "model.h5                 a trained model"},

@@ -5,31 +5,31 @@
 
 namespace {
 
-void run(const std::filesystem::path& file, const uniphy::UnknownsSource& source,
+void run(const std::filesystem::path& file, const uniphy::FitVariablesSource& source,
          const uniphy::FitOptions& options, uniphy::RunDirectory& out, uniphy::Metrics& metrics) {
   using namespace uniphy;
   const Observation observation = read_observation(file);
-  const auto unknowns = source.load();
+  const auto variables = source.load();
   FitHooks hooks;
   hooks.state_file = out.file("state.h5");
-  hooks.fingerprint = fit_fingerprint(observation, *unknowns, out.config_yaml());
-  const Inference result = infer(observation, file.string(), *unknowns, options, hooks);
+  hooks.fingerprint = fit_fingerprint(observation, *variables, out.config_yaml());
+  const Inference result = infer(observation, file.string(), *variables, options, hooks);
 
   write_latent(out.file("latent.h5"),
-               latent_of(result, *unknowns, source.model.string(), out.config_yaml()));
+               latent_of(result, *variables, source.model.string(), out.config_yaml()));
   write_trajectory(out.file("trajectory.h5"), result.fitted);
-  plot_chart(out.file("loss.png"), loss_chart(result.fit, *unknowns, "Inference"));
+  plot_chart(out.file("loss.png"), loss_chart(result.fit, *variables, "Inference"));
   const Trajectory seen = observed_trajectory(observation);
   plot_particles(out.file("frames.png"),
                  frames_picture({{"observed", &seen}, {"fitted", &result.fitted}}, 5));
-  add_metrics(metrics, result, observation, *unknowns);
+  add_metrics(metrics, result, observation, *variables);
   std::error_code ignored;
-  std::filesystem::remove(hooks.state_file, ignored);  // a finished fit is not taken up again
+  std::filesystem::remove(hooks.state_file, ignored);  // a finished fit is not resumed
 
   std::printf("fit_mse %.3e m^2, root/size %.3f %%, best start %.3e m^2, %zu roll-outs\n",
               result.fit_mse, 100 * *metrics.find("fit_root_over_size"), result.best_start,
               result.fit.history.size());
-  for (const NearestCode& near : unknowns->nearest(result.fit.u, 3)) {
+  for (const NearestCode& near : variables->nearest(result.fit.u, 3)) {
     std::printf("near start %d (%s), distance %.2f\n", near.code, near.material.c_str(),
                 near.distance);
   }
@@ -49,7 +49,7 @@ int main(int argc, char** argv) {
       {"DIR/latent.h5       the fitted material (layout: uniphy/io/latent_file.hpp)",
        "DIR/trajectory.h5   its roll-out at the observed frames, trajectory.xdmf for ParaView",
        "DIR/loss.png        loss of every candidate", "DIR/frames.png      observed and fitted",
-       "DIR/state.h5        while it runs: where it can be taken up again"},
+       "DIR/state.h5        while it runs: where it can be resumed"},
       {"uniphy_simulate configs/simulate/benchmark_cube.yaml --set output.observation=true --set "
        "scene.steps=400 --out out/cube",
        "uniphy_infer configs/infer/latent.yaml --set observation=out/cube/observation.h5 --out "
@@ -61,7 +61,7 @@ int main(int argc, char** argv) {
       argc, argv, info, [](uniphy::Section& config) -> uniphy::RunFunction {
         const std::filesystem::path file = config.input_file("observation", uniphy::required,
                                                              "observed positions (observation.h5)");
-        const uniphy::UnknownsSource source = uniphy::read_unknowns(config);
+        const uniphy::FitVariablesSource source = uniphy::read_fit_variables(config);
         const uniphy::FitOptions options = uniphy::read_fit_options(config);
         return [=](uniphy::RunDirectory& out, uniphy::Metrics& metrics) {
           run(file, source, options, out, metrics);

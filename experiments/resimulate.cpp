@@ -1,6 +1,6 @@
 #include <algorithm>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "uniphy/report/experiment.hpp"
 #include "uniphy/scene/law_config.hpp"
 #include "uniphy/scene/scene_config.hpp"

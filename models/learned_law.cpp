@@ -7,8 +7,8 @@
 #include <sstream>
 #include <string>
 
-#include "ops/kernels/error.hpp"
-#include "ops/mlp.hpp"
+#include "ops/kernels/base/error.hpp"
+#include "ops/mlp/mlp.hpp"
 
 namespace uniphy::models {
 

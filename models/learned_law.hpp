@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "ops/kernels/learned_law_weights.hpp"
+#include "ops/kernels/learned/learned_law_weights.hpp"
 #include "ops/reference/learned_law.hpp"
 
 namespace uniphy::models {
@@ -24,7 +24,8 @@ struct LearnedLawOptions {
 /// The learned law as a torch module: its parameters are the weights and biases of both networks
 /// ("projection_weight_0", ...), differentiable like z, F and C. Gradients are finite everywhere;
 /// in the isotropic form they are exact at equal singular values too. The networks run through the
-/// fused op (ops/mlp.hpp). For a fixed model with one latent ops/learned_law.hpp is much faster.
+/// fused op (ops/mlp/mlp.hpp). For a fixed model with one latent ops/learned/learned_law.hpp is
+/// much faster.
 ///
 ///   LearnedLaw law(options);
 ///   Tensor F_proj = law->project(F, z), tau = law->stress(F_proj, C, z);

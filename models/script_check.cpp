@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <memory>
 
-#include "ops/learned_law.hpp"
+#include "ops/learned/learned_law.hpp"
 
 namespace uniphy::models {
 

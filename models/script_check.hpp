@@ -8,8 +8,8 @@
 namespace uniphy::models {
 
 /// Deformations and rates that exercise a law: F = U Σ Vᵀ with random rotations, log Σ normal of
-/// deviation 0.2 (singular values apart, so that the seed form has one answer too), F = I never;
-/// C normal of 5/s. float64, [count, 3, 3] each.
+/// deviation 0.2 (singular values apart, so that the published form has one answer too), F = I
+/// never; C normal of 5/s. float64, [count, 3, 3] each.
 struct Probe {
   torch::Tensor F;
   torch::Tensor C;

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "models/torchscript_source.hpp"
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 
 namespace uniphy::models {
 
@@ -209,8 +209,8 @@ ScriptLaw load_script_law(const fs::path& file, std::optional<torch::Dtype> dtyp
   if (dtype && *dtype != law.dtype)
     differs(file, "attribute dtype", quoted(dtype_name(*dtype)), quoted(stored));
   const std::string form = attributes.text("form");
-  if (form != "isotropic" && form != "seed")
-    differs(file, "attribute form", "\"isotropic\" or \"seed\"", quoted(form));
+  if (form != "isotropic" && form != "published")
+    differs(file, "attribute form", "\"isotropic\" or \"published\"", quoted(form));
   law.form = kernels::form_from_name(form);
   law.latent_size = attributes.integer("latent_size");
   if (law.latent_size < 0)

@@ -21,7 +21,7 @@
 #include <optional>
 #include <string>
 
-#include "ops/kernels/learned_law_weights.hpp"
+#include "ops/kernels/learned/learned_law_weights.hpp"
 
 namespace uniphy::models {
 

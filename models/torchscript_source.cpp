@@ -3,7 +3,7 @@
 #include <cstdio>
 #include <limits>
 
-#include "ops/kernels/minimum_stretch.hpp"
+#include "ops/kernels/spectral/minimum_stretch.hpp"
 
 namespace uniphy::models {
 
@@ -159,7 +159,7 @@ def stress(self, F_proj: Tensor, C: Tensor, z: Tensor) -> Tensor:
 
 // One-sided Jacobi, rotation by rotation that of the kernels, so that U and V agree in the signs
 // that the convention leaves open: the networks see U and V themselves.
-const char* const kSeed = R"(
+const char* const kPublished = R"(
 def rotate(self, a: List[Tensor], v: List[Tensor], p: int, q: int) -> bool:
     alpha = (a[p] * a[p]).sum(1, keepdim=True)
     beta = (a[q] * a[q]).sum(1, keepdim=True)
@@ -263,7 +263,7 @@ std::string script_source(const kernels::LearnedLawWeights& weights, bool single
   std::string text = kCommon;
   text += network("projection", weights.projection.layers.size(), weights.activation);
   text += network("stress", weights.stress.layers.size(), weights.activation);
-  text += weights.form == LawForm::isotropic ? kIsotropic : kSeed;
+  text += weights.form == LawForm::isotropic ? kIsotropic : kPublished;
   text = replaced(text, "STRESS_SCALE", scale(0, kernels::kStressScale, kernels::kStressRate));
   text = replaced(text, "STRAIN_SCALE", scale(1, kernels::kStrainScale, kernels::kStrainRate));
   text = replaced(text, "TIME_SCALE", literal(kernels::kTimeScale));

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "ops/g2p.hpp"
+#include "ops/mpm/g2p.hpp"
 
 namespace uniphy::ops::reference {
 

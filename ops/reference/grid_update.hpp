@@ -2,7 +2,7 @@
 
 #include <torch/types.h>
 
-#include "ops/kernels/grid.hpp"
+#include "ops/kernels/mpm/grid.hpp"
 
 namespace uniphy::ops::reference {
 

@@ -2,7 +2,7 @@
 
 #include <torch/torch.h>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "ops/reference/svd3.hpp"
 
 namespace uniphy::ops::reference {

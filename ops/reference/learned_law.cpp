@@ -109,26 +109,26 @@ Tensor isotropic_project(const LearnedLawTensors& law, const Tensor& F, const Te
   return torch::where(at_matrix(fluid), at_matrix((t / 3).exp()) * identity(F), projected);
 }
 
-constexpr double kSeedFloor = 1e-6;
+constexpr double kPublishedFloor = 1e-6;
 
-Tensor seed_project(const LearnedLawTensors& law, const Tensor& F, const Tensor& z) {
+Tensor published_project(const LearnedLawTensors& law, const Tensor& F, const Tensor& z) {
   const SignedSvd s = signed_svd(F);
   const Tensor features =
       torch::cat({F.flatten(1), s.U.flatten(1), s.sigma, s.V.mT().flatten(1)}, 1);
   return F + law.mlp(law.projection, law.activation, features, z).reshape(F.sizes());
 }
 
-Tensor seed_stress(const LearnedLawTensors& law, const Tensor& F, const Tensor& C,
-                   const Tensor& z) {
+Tensor published_stress(const LearnedLawTensors& law, const Tensor& F, const Tensor& C,
+                        const Tensor& z) {
   const SignedSvd s = signed_svd(F);
   const Tensor R = polar_rotation(F, s);
   // Not torch's determinant, whose gradient divides by J.
   const Tensor J = (torch::linalg_cross(F.select(1, 0), F.select(1, 1)) * F.select(1, 2)).sum(1);
-  const Tensor F_max = F.select(1, 0).select(1, 0).clamp_min(kSeedFloor);
+  const Tensor F_max = F.select(1, 0).select(1, 0).clamp_min(kPublishedFloor);
   const Tensor rate = R.mT().matmul(C).matmul(R) * kernels::kTimeScale;
   const Tensor features =
       torch::cat({s.sigma, F.mT().matmul(F).flatten(1), J.unsqueeze(1),
-                  J.clamp_min(kSeedFloor).log().unsqueeze(1), F_max.unsqueeze(1),
+                  J.clamp_min(kPublishedFloor).log().unsqueeze(1), F_max.unsqueeze(1),
                   F_max.log().unsqueeze(1), rate.flatten(1)},
                  1);
   const Tensor S = law.mlp(law.stress, law.activation, features, z).reshape(F.sizes());
@@ -213,13 +213,14 @@ Tensor isotropic_stress(const LearnedLawTensors& law, const Tensor& H, const Ten
 }
 
 Tensor learned_project(const LearnedLawTensors& law, const Tensor& F, const Tensor& z) {
-  return law.form == LawForm::isotropic ? isotropic_project(law, F, z) : seed_project(law, F, z);
+  return law.form == LawForm::isotropic ? isotropic_project(law, F, z)
+                                        : published_project(law, F, z);
 }
 
 Tensor learned_stress(const LearnedLawTensors& law, const Tensor& F_proj, const Tensor& C,
                       const Tensor& z) {
   return law.form == LawForm::isotropic ? isotropic_stress(law, hencky_tensor(F_proj), C, z)
-                                        : seed_stress(law, F_proj, C, z);
+                                        : published_stress(law, F_proj, C, z);
 }
 
 }  // namespace uniphy::ops::reference

@@ -4,11 +4,11 @@
 
 #include <vector>
 
-#include "ops/kernels/learned_law_weights.hpp"
+#include "ops/kernels/learned/learned_law_weights.hpp"
 
-// The learned law in plain tensor operations: the reference of ops/learned_law.hpp, and what the
-// torch module of models/ runs, so that autograd reaches the weights. The formulas are those of
-// ops/kernels/isotropic_law.hpp and seed_law.hpp.
+// The learned law in plain tensor operations: the reference of ops/learned/learned_law.hpp, and
+// what the torch module of models/ runs, so that autograd reaches the weights. The formulas are
+// those of ops/kernels/learned/isotropic_law.hpp and published_law.hpp.
 //
 // F, F_proj, C [P, 3, 3] (dimensionless, dimensionless, 1/s); z [Z] for all particles or [P, Z];
 // tau [P, 3, 3] Pa. All tensors share one dtype, float32 or float64.

@@ -5,7 +5,7 @@
 #include <functional>
 #include <utility>
 
-#include "ops/kernels/grid.hpp"
+#include "ops/kernels/mpm/grid.hpp"
 
 namespace uniphy::ops::reference {
 

@@ -2,7 +2,7 @@
 
 #include <torch/types.h>
 
-#include "ops/material.hpp"
+#include "ops/laws/material.hpp"
 
 namespace uniphy::ops::reference {
 

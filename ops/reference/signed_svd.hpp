@@ -5,7 +5,7 @@
 namespace uniphy::ops::reference {
 
 /// F = U diag(sigma) Vᵀ with U, V rotations, |sigma| in decreasing order, the sign of det F on the
-/// last one (spec of the signed convention: ops/kernels/svd3.hpp).
+/// last one (spec of the signed convention: ops/kernels/spectral/svd3.hpp).
 struct SignedSvd {
   torch::Tensor U;      ///< [P, 3, 3]
   torch::Tensor sigma;  ///< [P, 3]

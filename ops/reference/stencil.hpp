@@ -2,12 +2,12 @@
 
 #include <torch/types.h>
 
-#include "ops/kernels/grid.hpp"
+#include "ops/kernels/mpm/grid.hpp"
 
 namespace uniphy::ops::reference {
 
-/// The stencil of the quadratic B-spline (ops/kernels/bspline.hpp) in plain tensor operations, for
-/// the 27 nodes of each particle. x [P, 3] m. Differentiable by autograd.
+/// The stencil of the quadratic B-spline (ops/kernels/mpm/bspline.hpp) in plain tensor operations,
+/// for the 27 nodes of each particle. x [P, 3] m. Differentiable by autograd.
 struct Stencil {
   torch::Tensor node;    ///< [P, 27] index of the node in the flattened grid
   torch::Tensor weight;  ///< [P, 27]

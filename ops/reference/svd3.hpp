@@ -2,7 +2,7 @@
 
 #include <torch/types.h>
 
-#include "ops/svd3.hpp"
+#include "ops/spectral/svd3.hpp"
 
 namespace uniphy::ops::reference {
 

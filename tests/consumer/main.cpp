@@ -1,7 +1,7 @@
 #include <cstdio>
 
-#include "ops/kernels/error.hpp"
-#include "ops/kernels/isa.hpp"
+#include "ops/kernels/base/error.hpp"
+#include "ops/kernels/simd/isa.hpp"
 
 int main() {
   try {

@@ -10,8 +10,8 @@
 
 #include "models/latent_codes.hpp"
 #include "models/script_check.hpp"
-#include "ops/kernels/error.hpp"
-#include "ops/learned_law.hpp"
+#include "ops/kernels/base/error.hpp"
+#include "ops/learned/learned_law.hpp"
 
 namespace uniphy::models {
 namespace {
@@ -36,7 +36,7 @@ double relative(const Tensor& a, const Tensor& b) {
 LearnedLawOptions options(LawForm form) {
   LearnedLawOptions o;
   o.form = form;
-  o.activation = form == LawForm::seed ? Activation::gelu : Activation::silu;
+  o.activation = form == LawForm::published ? Activation::gelu : Activation::silu;
   o.latent_size = 5;
   o.projection_hidden = {24, 12};
   o.stress_hidden = {16, 20, 8};
@@ -157,7 +157,7 @@ TEST_P(LearnedLawModule, RefusesWhatDoesNotFit) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Forms, LearnedLawModule,
-                         ::testing::Values(LawForm::isotropic, LawForm::seed),
+                         ::testing::Values(LawForm::isotropic, LawForm::published),
                          [](const auto& info) { return kernels::form_name(info.param); });
 
 TEST(LatentCodes, GoThroughAModelFile) {

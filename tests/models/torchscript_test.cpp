@@ -12,8 +12,8 @@
 #include <functional>
 
 #include "models/script_check.hpp"
-#include "ops/kernels/error.hpp"
-#include "ops/learned_law.hpp"
+#include "ops/kernels/base/error.hpp"
+#include "ops/learned/learned_law.hpp"
 #include "tests/support/random_weights.hpp"
 
 namespace uniphy::models {
@@ -154,9 +154,10 @@ INSTANTIATE_TEST_SUITE_P(
              torch::kFloat64},
         Case{"isotropic_silu_float32", LawForm::isotropic, Activation::silu, 8, 32, 3,
              torch::kFloat32},
-        Case{"seed_gelu", LawForm::seed, Activation::gelu, 32, 128, 4, torch::kFloat64},
-        Case{"seed_linear", LawForm::seed, Activation::silu, 2, 8, 0, torch::kFloat64},
-        Case{"seed_silu_float32", LawForm::seed, Activation::silu, 8, 32, 2, torch::kFloat32}),
+        Case{"published_gelu", LawForm::published, Activation::gelu, 32, 128, 4, torch::kFloat64},
+        Case{"published_linear", LawForm::published, Activation::silu, 2, 8, 0, torch::kFloat64},
+        Case{"published_silu_float32", LawForm::published, Activation::silu, 8, 32, 2,
+             torch::kFloat32}),
     [](const auto& info) { return std::string(info.param.name); });
 
 std::string message_of(const std::function<void()>& call) {
@@ -201,12 +202,12 @@ TEST_F(ScriptLawErrors, WrongAttributes) {
   EXPECT_EQ(after([](auto& m) { m.setattr("dtype", std::string("float32")); }),
             prefix() + "buffer projection_weight_0: expected dtype float32, found float64");
   EXPECT_EQ(after([](auto& m) { m.setattr("form", std::string("cubic")); }),
-            prefix() + "attribute form: expected \"isotropic\" or \"seed\", found \"cubic\"");
+            prefix() + "attribute form: expected \"isotropic\" or \"published\", found \"cubic\"");
   EXPECT_EQ(after([](auto& m) { m.setattr("latent_size", 4); }),
             prefix() +
                 "buffer projection_weight_0: expected [n, 7] and a bias of [n], found [8, "
                 "6] and a bias of [8]");
-  EXPECT_EQ(after([](auto& m) { m.setattr("form", std::string("seed")); }),
+  EXPECT_EQ(after([](auto& m) { m.setattr("form", std::string("published")); }),
             prefix() +
                 "buffer projection_weight_0: expected [n, 33] and a bias of [n], found [8, "
                 "6] and a bias of [8]");

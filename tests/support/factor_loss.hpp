@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "ops/kernels/law_table.hpp"
+#include "ops/kernels/laws/law_table.hpp"
 #include "tests/support/finite_differences.hpp"
 #include "tests/support/matrix_math.hpp"
 

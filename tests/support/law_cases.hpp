@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "ops/kernels/law.hpp"
+#include "ops/kernels/laws/law.hpp"
 #include "tests/support/matrix_math.hpp"
 
 namespace uniphy::testing {

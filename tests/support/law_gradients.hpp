@@ -4,7 +4,7 @@
 #include <numeric>
 #include <vector>
 
-#include "ops/kernels/analytic_law.hpp"
+#include "ops/kernels/laws/analytic_law.hpp"
 #include "tests/support/finite_differences.hpp"
 #include "tests/support/law_cases.hpp"
 

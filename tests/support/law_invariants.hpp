@@ -8,7 +8,7 @@
 #include <limits>
 #include <vector>
 
-#include "ops/kernels/law.hpp"
+#include "ops/kernels/laws/law.hpp"
 #include "tests/support/matrix_math.hpp"
 
 // What every law must satisfy, analytic or learned. Each check takes the law as simulation sees it.

@@ -4,7 +4,7 @@
 
 #include <array>
 
-#include "ops/material.hpp"
+#include "ops/laws/material.hpp"
 #include "tests/support/tensors.hpp"
 
 namespace uniphy::testing {

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "ops/learned_law.hpp"
+#include "ops/learned/learned_law.hpp"
 #include "tests/support/law_cases.hpp"
 #include "tests/support/random_weights.hpp"
 #include "tests/support/tensors.hpp"
@@ -37,8 +37,8 @@ double smooth_gradient_error(const torch::Tensor& gradient, const torch::Tensor&
   return (error.norm() / fine.masked_select(smooth).norm()).item<double>();
 }
 
-/// A law with random weights. The seed form sees the factors of F, which have a derivative only
-/// where the singular values are apart: the other cases are left out.
+/// A law with random weights. the published form sees the factors of F, which have a derivative
+/// only where the singular values are apart: the other cases are left out.
 inline LearnedLawErrors learned_law_errors(kernels::LawForm form) {
   const auto weights = std::make_shared<kernels::LearnedLawWeights>(
       random_weights(form, 5, 20, 2, kernels::Activation::gelu, 7));
@@ -47,7 +47,7 @@ inline LearnedLawErrors learned_law_errors(kernels::LawForm form) {
   std::mt19937_64 random(29);
   for (const DeformationCase& c : deformation_cases()) {
     const double upper = c.sigma[0] - c.sigma[4], lower = c.sigma[4] - std::abs(c.sigma[8]);
-    if (form == kernels::LawForm::seed && std::min(upper, lower) < 0.01) continue;
+    if (form == kernels::LawForm::published && std::min(upper, lower) < 0.01) continue;
     // A random law yields at rest, as sand does: F = I is its tip, where no derivative exists. What
     // does not yield has one there.
     const ops::SharedWeights law = c.F == identity() ? elastic : weights;

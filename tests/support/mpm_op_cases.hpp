@@ -5,9 +5,9 @@
 #include <functional>
 #include <vector>
 
-#include "ops/g2p.hpp"
-#include "ops/grid_update.hpp"
-#include "ops/p2g.hpp"
+#include "ops/mpm/g2p.hpp"
+#include "ops/mpm/grid_update.hpp"
+#include "ops/mpm/p2g.hpp"
 #include "ops/reference/g2p.hpp"
 #include "ops/reference/grid_update.hpp"
 #include "ops/reference/p2g.hpp"

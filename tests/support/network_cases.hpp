@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include "ops/mlp.hpp"
+#include "ops/mlp/mlp.hpp"
 #include "tests/support/tensors.hpp"
 
 namespace uniphy::testing {

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <random>
 
-#include "ops/kernels/learned_law_weights.hpp"
+#include "ops/kernels/learned/learned_law_weights.hpp"
 
 namespace uniphy::testing {
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "ops/rollout.hpp"
+#include "ops/rollout/rollout.hpp"
 #include "tests/support/finite_differences.hpp"
 #include "tests/support/law_cases.hpp"
 #include "tests/support/random_weights.hpp"
@@ -78,16 +78,17 @@ inline std::vector<RolloutMaterial> rollout_materials() {
     if (is_plastic(id)) law.tau_y = 500;
     all.push_back({kernels::law_name(id), law, parameters_of(law)});
   }
-  for (const auto form : {kernels::LawForm::isotropic, kernels::LawForm::seed}) {
+  for (const auto form : {kernels::LawForm::isotropic, kernels::LawForm::published}) {
     kernels::LawDescription law;
     law.id = kernels::LawId::learned;
     auto weights = random_weights(form, 6, 16, 2, kernels::Activation::gelu, 5, 0.5);
-    // Untrained, the seed form adds noise to F in every step: keep it small enough to fly; and the
-    // isotropic form switches between solid and fluid where it stands: keep its caps apart from 0.
+    // Untrained, the published form adds noise to F in every step: keep it small enough to fly; and
+    // the isotropic form switches between solid and fluid where it stands: keep its caps apart from
+    // 0.
     kernels::MlpWeights::Layer& last = weights.projection.layers.back();
-    const bool seed = form == kernels::LawForm::seed;
-    for (double& w : last.weight) w *= seed ? 1e-3 : 0.1;
-    if (seed) {
+    const bool published = form == kernels::LawForm::published;
+    for (double& w : last.weight) w *= published ? 1e-3 : 0.1;
+    if (published) {
       for (double& b : last.bias) b *= 1e-3;
     } else {
       last.bias = {0.5, 5, 0.3, 0.5};
@@ -110,8 +111,8 @@ struct RolloutErrors {
 
 inline RolloutErrors rollout_errors(const RolloutMaterial& m) {
   RolloutScene scene;
-  if (m.name == "seed") {
-    // The seed form is not smooth where singular values meet: start with some apart.
+  if (m.name == "published") {
+    // the published form is not smooth where singular values meet: start with some apart.
     scene.F = torch::diag(torch::tensor({1.2, 1.0, 0.8}, torch::kFloat64))
                   .repeat({scene.x.size(0), 1, 1});
   }

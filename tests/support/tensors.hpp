@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "tests/support/finite_differences.hpp"
 #include "tests/support/law_cases.hpp"
 

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "uniphy/bench/goals.hpp"
 #include "uniphy/bench/roofline.hpp"
 #include "uniphy/bench/subjects.hpp"

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "ops/reference/learned_law.hpp"
 #include "ops/reference/mpm_step.hpp"
 #include "uniphy/bench/added_memory.hpp"
@@ -102,7 +102,7 @@ void bench_epoch(const BenchOptions& options, int threads, BenchReport& report) 
   const auto objective = make_motion_objective(observation, observed_steps(observation, "bench"),
                                                observed_grid(observation, "bench"), "float32");
   const RigidMotion motion = benchmark_motion();
-  for (const auto form : {kernels::LawForm::seed, kernels::LawForm::isotropic}) {
+  for (const auto form : {kernels::LawForm::published, kernels::LawForm::isotropic}) {
     const kernels::LawDescription law = description(form);
     const auto epoch = [&] {
       if (!std::isfinite(objective->evaluate(law, motion, observation.frames).mse)) {

@@ -1,9 +1,9 @@
 #include <torch/torch.h>
 
-#include "ops/kirchhoff_stress.hpp"
+#include "ops/laws/kirchhoff_stress.hpp"
+#include "ops/laws/return_mapping.hpp"
 #include "ops/reference/kirchhoff_stress.hpp"
 #include "ops/reference/return_mapping.hpp"
-#include "ops/return_mapping.hpp"
 #include "uniphy/bench/subjects.hpp"
 
 namespace uniphy::bench {

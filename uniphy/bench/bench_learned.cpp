@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "ops/kernels/law.hpp"
+#include "ops/kernels/laws/law.hpp"
 #include "ops/reference/learned_law.hpp"
 #include "uniphy/bench/random_law.hpp"
 #include "uniphy/bench/subjects.hpp"
@@ -145,7 +145,7 @@ void bench_size(const BenchOptions& options, kernels::LawForm form, std::int64_t
 }  // namespace
 
 void bench_learned(const BenchOptions& options, int threads, BenchReport& report) {
-  for (const auto form : {kernels::LawForm::seed, kernels::LawForm::isotropic}) {
+  for (const auto form : {kernels::LawForm::published, kernels::LawForm::isotropic}) {
     for (const std::int64_t n : options.learned_particles) {
       bench_size(options, form, n, threads, report);
     }

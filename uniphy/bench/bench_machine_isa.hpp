@@ -2,7 +2,7 @@
 
 #include <cstddef>
 
-#include "ops/kernels/isa.hpp"
+#include "ops/kernels/simd/isa.hpp"
 
 namespace uniphy::bench {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <random>
 
-#include "ops/kernels/rollout_engine.hpp"
+#include "ops/kernels/rollout/rollout_engine.hpp"
 #include "ops/reference/mpm_step.hpp"
 #include "uniphy/bench/free_law.hpp"
 #include "uniphy/bench/subjects.hpp"

@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <set>
 
-#include "ops/kernels/law.hpp"
-#include "ops/kernels/law_table.hpp"
+#include "ops/kernels/laws/law.hpp"
+#include "ops/kernels/laws/law_table.hpp"
 
 namespace uniphy::bench {
 

@@ -26,7 +26,7 @@ struct Machine {
 /// One measured thing. Times are for one particle (matrix, particle-step, sample) or, in an epoch,
 /// for the whole.
 struct BenchRow {
-  std::string work;            ///< "svd3 f32", "law sand", "learned seed", "mpm step", …
+  std::string work;            ///< "svd3 f32", "law sand", "learned published", "mpm step", …
   std::string pass;            ///< "forward", "backward", "both"
   std::int64_t particles = 0;  ///< of one call
   double one = kNone;          ///< s on one thread

@@ -1,6 +1,6 @@
 #include <torch/torch.h>
 
-#include "ops/svd3.hpp"
+#include "ops/spectral/svd3.hpp"
 #include "uniphy/bench/subjects.hpp"
 
 namespace uniphy::bench {

@@ -2,7 +2,7 @@
 
 #include <random>
 
-#include "ops/plain_tensors.hpp"
+#include "ops/base/plain_tensors.hpp"
 #include "uniphy/bench/subjects.hpp"
 #include "uniphy/data/material_ranges.hpp"
 #include "uniphy/training/batches.hpp"

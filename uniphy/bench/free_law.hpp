@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "ops/kernels/law.hpp"
+#include "ops/kernels/laws/law.hpp"
 
 namespace uniphy::bench {
 

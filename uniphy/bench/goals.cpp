@@ -20,23 +20,26 @@ struct Extremes {
 };
 
 void add_learned(const BenchReport& report, std::vector<Goal>& goals) {
-  Extremes share, back, speedup, over_seed;
-  for (const BenchRow* forward : report.all("learned seed", "forward")) {
-    const BenchRow* backward = report.find("learned seed", "backward", forward->particles);
+  Extremes share, back, speedup, over_published;
+  for (const BenchRow* forward : report.all("learned published", "forward")) {
+    const BenchRow* backward = report.find("learned published", "backward", forward->particles);
     share.add(forward->flops / forward->one / 1e9 / report.machine.fma_core);
     back.add(backward->one / forward->one);
-    speedup.add(report.find("learned seed", "both", forward->particles)->speedup());
-    for (const BenchRow* seed : {forward, backward}) {
-      const BenchRow* isotropic = report.find("learned isotropic", seed->pass, seed->particles);
-      over_seed.add(seed->one / isotropic->one);
+    speedup.add(report.find("learned published", "both", forward->particles)->speedup());
+    for (const BenchRow* published : {forward, backward}) {
+      const BenchRow* isotropic =
+          report.find("learned isotropic", published->pass, published->particles);
+      over_published.add(published->one / isotropic->one);
     }
   }
-  goals.push_back({"law_seed_fwd_peak_share", "learned law, seed 4x128: share of FMA rate",
-                   share.low, 0.6, false});
-  goals.push_back({"law_seed_bwd_over_fwd", "  backward over forward", back.high, 2.5, true});
-  goals.push_back({"law_seed_speedup", "  over plain tensors, both passes", speedup.low, 5, false});
-  goals.push_back({"law_isotropic_over_seed", "learned law, isotropic 3x32: speed over seed size",
-                   over_seed.low, 10, false});
+  goals.push_back({"law_published_fwd_peak_share",
+                   "learned law, published 4x128: share of FMA rate", share.low, 0.6, false});
+  goals.push_back({"law_published_bwd_over_fwd", "  backward over forward", back.high, 2.5, true});
+  goals.push_back(
+      {"law_published_speedup", "  over plain tensors, both passes", speedup.low, 5, false});
+  goals.push_back({"law_isotropic_over_published",
+                   "learned law, isotropic 3x32: speed over published size", over_published.low, 10,
+                   false});
 }
 
 void add_epochs(const BenchReport& report, std::vector<Goal>& goals) {
@@ -48,7 +51,7 @@ void add_epochs(const BenchReport& report, std::vector<Goal>& goals) {
     goals.push_back(
         {fmt::format("epoch_{}_mb", form), "  peak extra memory, MB", row->memory_mb, mb, true});
   };
-  add("seed", 6, 300);
+  add("published", 6, 300);
   add("isotropic", 1, 200);
 }
 

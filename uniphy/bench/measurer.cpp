@@ -10,7 +10,7 @@
 #include <limits>
 #include <thread>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "uniphy/report/interrupt.hpp"
 
 namespace uniphy::bench {

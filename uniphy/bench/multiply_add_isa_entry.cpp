@@ -1,6 +1,6 @@
 // Compiled once for each instruction set, as the kernels are.
 
-#include "ops/kernels/lanes.hpp"
+#include "ops/kernels/simd/lanes.hpp"
 
 namespace uniphy::kernels {
 inline namespace UNIPHY_ISA {

@@ -3,13 +3,13 @@
 #include <memory>
 #include <vector>
 
-#include "ops/kernels/learned_law_weights.hpp"
+#include "ops/kernels/learned/learned_law_weights.hpp"
 
 namespace uniphy::bench {
 
 /// An untrained learned law of the size that the goals are about: isotropic 3×32 with 8 latent
-/// numbers and silu, seed 4×128 with 32 and gelu. Its answers are tame: roll-outs with it stay in
-/// the box. The speed of a law does not depend on its weights.
+/// numbers and silu, published 4x128 with 32 and gelu. Its answers are tame: roll-outs with it stay
+/// in the box. The speed of a law does not depend on its weights.
 std::shared_ptr<const kernels::LearnedLawWeights> random_law(kernels::LawForm form);
 
 /// A latent code for it.

@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "uniphy/config/state.hpp"
 
 namespace uniphy {

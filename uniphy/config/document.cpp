@@ -8,7 +8,7 @@
 
 #include <sstream>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "uniphy/config/text_check.hpp"
 #include "uniphy/io/atomic_file.hpp"
 

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "uniphy/config/config.hpp"
 #include "uniphy/config/state.hpp"
 

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "ops/kernels/law.hpp"
+#include "ops/kernels/laws/law.hpp"
 #include "uniphy/geometry/random.hpp"
 #include "uniphy/io/dataset.hpp"
 

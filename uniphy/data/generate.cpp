@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <exception>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "uniphy/data/dataset_metrics.hpp"
 #include "uniphy/data/part_file.hpp"
 #include "uniphy/data/random_streams.hpp"

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <map>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "uniphy/geometry/shape_catalogue.hpp"
 
 namespace uniphy {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "ops/kernels/grid.hpp"
+#include "ops/kernels/mpm/grid.hpp"
 #include "uniphy/config/config.hpp"
 #include "uniphy/data/material_ranges.hpp"
 

@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "ops/kernels/svd3.hpp"
+#include "ops/kernels/spectral/svd3.hpp"
 #include "uniphy/data/material_ranges.hpp"
 
 namespace uniphy {

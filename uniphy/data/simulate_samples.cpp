@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "uniphy/data/drawn_states.hpp"
 #include "uniphy/data/law_branches.hpp"
 #include "uniphy/data/select_samples.hpp"

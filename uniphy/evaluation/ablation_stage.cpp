@@ -7,7 +7,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "uniphy/data/generate.hpp"
 #include "uniphy/evaluation/ablation_report.hpp"
 #include "uniphy/evaluation/law_cost.hpp"

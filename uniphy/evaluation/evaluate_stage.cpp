@@ -5,7 +5,7 @@
 #include <cmath>
 #include <fstream>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "uniphy/evaluation/heldout_stage.hpp"
 #include "uniphy/report/plot.hpp"
 #include "uniphy/scene/comparison.hpp"

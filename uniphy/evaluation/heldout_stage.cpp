@@ -8,7 +8,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "uniphy/data/generate.hpp"
 #include "uniphy/evaluation/error_table.hpp"
 #include "uniphy/evaluation/heldout_options.hpp"

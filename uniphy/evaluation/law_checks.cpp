@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "uniphy/data/random_rotation.hpp"
 #include "uniphy/data/random_streams.hpp"
 #include "uniphy/data/trajectory_setup.hpp"

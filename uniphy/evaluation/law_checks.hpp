@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "ops/kernels/grid.hpp"
-#include "ops/kernels/law.hpp"
+#include "ops/kernels/laws/law.hpp"
+#include "ops/kernels/mpm/grid.hpp"
 #include "uniphy/io/dataset.hpp"
 
 namespace uniphy {

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "uniphy/data/dataset_setup.hpp"
 #include "uniphy/evaluation/parallel_work.hpp"
 #include "uniphy/scene/comparison.hpp"

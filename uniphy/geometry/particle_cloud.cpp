@@ -1,6 +1,6 @@
 #include "uniphy/geometry/particle_cloud.hpp"
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "uniphy/geometry/text_file.hpp"
 #include "uniphy/io/hdf5.hpp"
 

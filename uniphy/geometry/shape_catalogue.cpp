@@ -3,7 +3,7 @@
 #include <functional>
 #include <map>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "uniphy/geometry/shapes/blobby.hpp"
 #include "uniphy/geometry/shapes/box.hpp"
 #include "uniphy/geometry/shapes/capped_cone.hpp"

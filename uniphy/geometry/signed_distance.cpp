@@ -4,7 +4,7 @@
 #include <cmath>
 #include <sstream>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 
 namespace uniphy {
 namespace {

@@ -5,7 +5,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 
 namespace uniphy {
 

@@ -9,7 +9,7 @@
 #include <map>
 #include <utility>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "uniphy/geometry/text_file.hpp"
 
 namespace uniphy {

@@ -24,7 +24,7 @@ struct Identified {
 /// What the pictures show of it.
 struct CasePictures {
   std::string material;
-  Trajectory observed, fitted, foretold, truth;
+  Trajectory observed, fitted, predicted, truth;
   std::vector<double> best;  ///< over the roll-outs of the result's candidate, m²
 };
 
@@ -44,7 +44,7 @@ void write_case_result(const std::filesystem::path& folder, const CaseResult& re
 std::optional<CaseResult> read_case_result(const std::filesystem::path& folder,
                                            const std::string& fingerprint);
 
-/// A finished run is not taken up again.
+/// A finished run is not resumed.
 void forget_case_result(const std::filesystem::path& folder);
 
 }  // namespace uniphy

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "uniphy/inference/observed_motion.hpp"
 #include "uniphy/scene/scene.hpp"
 

@@ -17,7 +17,7 @@ struct HiddenCaseOptions {
 };
 
 /// An object of undisclosed material in two scenes: it is observed in the first, and its behaviour
-/// in the second, of another shape and another velocity, is to be foretold.
+/// in the second, of another shape and another velocity, is to be predicted.
 struct HiddenCase {
   TrajectorySetup observed, other;
   Trajectory observed_truth, other_truth;

@@ -9,7 +9,7 @@
 #include <fstream>
 #include <limits>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "uniphy/io/atomic_file.hpp"
 #include "uniphy/io/latent_file.hpp"
 #include "uniphy/io/observation.hpp"
@@ -43,14 +43,14 @@ std::vector<double> best_so_far(const FitResult& fit) {
   return best;
 }
 
-Trajectory foretell(const HiddenCase& hidden, const kernels::LawDescription& law) {
+Trajectory predict(const HiddenCase& hidden, const kernels::LawDescription& law) {
   SceneDescription scene = hidden.other.scene;
   scene.bodies.front().law = law;
   return run_scene(scene);
 }
 
 CaseResult identify_one(const IdentifyOptions& options, std::int64_t material,
-                        const Unknowns& unknowns, const RunDirectory& out) {
+                        const FitVariables& variables, const RunDirectory& out) {
   const auto start = std::chrono::steady_clock::now();
   reset_peak_memory();
   CaseResult found;
@@ -70,18 +70,18 @@ CaseResult identify_one(const IdentifyOptions& options, std::int64_t material,
   const std::string name = (folder / "observation.h5").string();
   const Observation observation = read_observation(name);
   std::fprintf(stderr, "%s\n", row.material.c_str());
-  const Inference result = infer(observation, name, unknowns, options.fit, {});
+  const Inference result = infer(observation, name, variables, options.fit, {});
   write_latent(folder / "latent.h5",
-               latent_of(result, unknowns, options.unknowns.model.string(), out.config_yaml()));
+               latent_of(result, variables, options.variables.model.string(), out.config_yaml()));
   write_trajectory(folder / "fitted.h5", result.fitted);
-  plot_chart(folder / "loss.png", loss_chart(result.fit, unknowns, row.material));
+  plot_chart(folder / "loss.png", loss_chart(result.fit, variables, row.material));
   row.fit_mse = result.fit_mse;
   row.fit_share = std::sqrt(result.fit_mse) / result.size;
   row.roll_outs = result.fit.history.size();
-  row.nearest = unknowns.nearest(result.fit.u, 1).front().material;
+  row.nearest = variables.nearest(result.fit.u, 1).front().material;
   row.other_best = std::numeric_limits<double>::infinity();
-  for (int i = 0; i < unknowns.starts(); ++i) {
-    if (unknowns.label(i) == row.material) continue;
+  for (int i = 0; i < variables.starts(); ++i) {
+    if (variables.label(i) == row.material) continue;
     row.other_best = std::min(row.other_best, result.fit.start_mse[i]);
   }
   row.beats_other = row.fit_mse < row.other_best;
@@ -92,10 +92,10 @@ CaseResult identify_one(const IdentifyOptions& options, std::int64_t material,
   pictured.best = best_so_far(result.fit);
   pictured.truth = hidden.other_truth;
   write_trajectory(folder / "other_truth.h5", hidden.other_truth);
-  pictured.foretold = foretell(hidden, result.fit.law);
-  write_trajectory(folder / "resimulated.h5", pictured.foretold);
+  pictured.predicted = predict(hidden, result.fit.law);
+  write_trajectory(folder / "resimulated.h5", pictured.predicted);
   const TrajectoryComparison comparison =
-      compare_trajectories(pictured.foretold, hidden.other_truth, FrameMatch::all,
+      compare_trajectories(pictured.predicted, hidden.other_truth, FrameMatch::all,
                            "the re-simulation", "the analytic one");
   row.resim_mse = comparison.position_mse;
   row.resim_share = comparison.root_over_size;
@@ -105,7 +105,7 @@ CaseResult identify_one(const IdentifyOptions& options, std::int64_t material,
 }
 
 CaseResult taken_up_or_identified(const IdentifyOptions& options, std::int64_t material,
-                                  const Unknowns& unknowns, const std::string& fingerprint,
+                                  const FitVariables& variables, const std::string& fingerprint,
                                   const RunDirectory& out) {
   const std::string name = options.hidden.draw.materials[material].name();
   const std::filesystem::path folder = out.file(name);
@@ -113,7 +113,7 @@ CaseResult taken_up_or_identified(const IdentifyOptions& options, std::int64_t m
     std::fprintf(stderr, "%s: finished by the interrupted run\n", name.c_str());
     return *std::move(finished);
   }
-  CaseResult found = identify_one(options, material, unknowns, out);
+  CaseResult found = identify_one(options, material, variables, out);
   write_case_result(folder, found, fingerprint);
   return found;
 }
@@ -152,7 +152,7 @@ void draw_pictures(const std::vector<CasePictures>& all, RunDirectory& out) {
     for (const auto& [name, trajectory] :
          {std::pair<const char*, const Trajectory*>{"observed", &p.observed},
           {"fitted", &p.fitted},
-          {"re-simulated", &p.foretold},
+          {"re-simulated", &p.predicted},
           {"true there", &p.truth}}) {
       if (trajectory->frames == 0) continue;
       const ParticlePicture strip = frames_picture({{"", trajectory}}, 4);
@@ -190,9 +190,9 @@ std::string identify_table(const std::vector<Identified>& rows) {
 }
 
 void identify(const IdentifyOptions& options, RunDirectory& out, Metrics& metrics) {
-  const auto unknowns = options.unknowns.load();
+  const auto variables = options.variables.load();
   // The scenes follow from the configuration.
-  const std::string fingerprint = fit_fingerprint({}, *unknowns, out.config_yaml());
+  const std::string fingerprint = fit_fingerprint({}, *variables, out.config_yaml());
   std::vector<Identified> rows;
   std::vector<CasePictures> pictures;
   std::string failures;
@@ -201,7 +201,7 @@ void identify(const IdentifyOptions& options, RunDirectory& out, Metrics& metric
     const std::string name = options.hidden.draw.materials[material].name();
     Identified row;
     try {
-      CaseResult found = taken_up_or_identified(options, material, *unknowns, fingerprint, out);
+      CaseResult found = taken_up_or_identified(options, material, *variables, fingerprint, out);
       row = found.row;
       pictures.push_back(std::move(found.pictures));
     } catch (const Error& error) {

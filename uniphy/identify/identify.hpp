@@ -11,10 +11,10 @@
 
 namespace uniphy {
 
-/// The main job: identify objects of undisclosed material and foretell them elsewhere.
+/// The main job: identify objects of undisclosed material and predict them elsewhere.
 struct IdentifyOptions {
   HiddenCaseOptions hidden;
-  UnknownsSource unknowns;
+  FitVariablesSource variables;
   FitOptions fit;
 };
 

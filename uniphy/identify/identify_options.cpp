@@ -45,7 +45,7 @@ IdentifyOptions read_identify_options(Section& config) {
                                                           "knurling", "pawn", "rounded_cone", "toy"}
                                : o.heldout_shapes,
       shape_names(), "none that training saw", at_least(2));
-  options.unknowns = read_unknowns(config);
+  options.variables = read_fit_variables(config);
   Section fit = config.section("fit", "as in uniphy_infer");
   options.fit = read_fit_options(fit);
   return options;

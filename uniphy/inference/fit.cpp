@@ -9,9 +9,9 @@
 #include <optional>
 #include <set>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "uniphy/inference/fit_problem.hpp"
-#include "uniphy/inference/side_by_side.hpp"
+#include "uniphy/inference/for_each.hpp"
 #include "uniphy/report/interrupt.hpp"
 #include "uniphy/report/progress.hpp"
 
@@ -27,7 +27,7 @@ class Fit {
       const FitHooks& hooks)
       : problem_(problem),
         name_(name),
-        unknowns_(problem.unknowns()),
+        variables_(problem.variables()),
         options_(options),
         hooks_(hooks) {}
 
@@ -50,7 +50,7 @@ class Fit {
   int stages() const { return problem_.stages(); }
 
   std::int64_t total_work() const {
-    std::int64_t total = unknowns_.starts();
+    std::int64_t total = variables_.starts();
     for (const FitStage& s : options_.stages) total += std::int64_t(s.candidates) * s.epochs;
     return total;
   }
@@ -81,7 +81,7 @@ class Fit {
   }
 
   FitCandidate start_candidate(int start, int stage) const {
-    FitCandidate c = problem_.candidate(start, unknowns_.start(start));
+    FitCandidate c = problem_.candidate(start, variables_.start(start));
     c.mse = start_mse(start, stage);
     c.loss = problem_.loss(c.mse, c.u);
     return c;
@@ -92,15 +92,15 @@ class Fit {
   }
 
   void rank() {
-    const int starts = unknowns_.starts();
+    const int starts = variables_.starts();
     std::vector<double> table(starts * stages(), kInfinity);
     constexpr int kBlock = 32;  // between two looks at the clock
     for (int first = 0; first < starts; first += kBlock) {
       const int count = std::min(kBlock, starts - first);
-      side_by_side(count, [&](int k) {
+      for_each(count, [&](int k) {
         const int i = first + k;
         const auto mse =
-            problem_.frame_mse(problem_.candidate(i, unknowns_.start(i)), problem_.frames());
+            problem_.frame_mse(problem_.candidate(i, variables_.start(i)), problem_.frames());
         for (int s = 0; s < stages(); ++s) {
           table[i * stages() + s] = mean_of_first(mse, problem_.frames(s));
         }
@@ -113,7 +113,7 @@ class Fit {
       early[i] = start_mse(i, 0);
       full[i] = start_mse(i, stages() - 1);
     }
-    for (const int i : choose_starts(unknowns_, early, full, options_.stages[0].candidates)) {
+    for (const int i : choose_starts(variables_, early, full, options_.stages[0].candidates)) {
       state_.candidates.push_back(start_candidate(i, 0));
     }
     if (state_.candidates.empty()) problem_.refuse_starts();
@@ -150,7 +150,7 @@ class Fit {
       }
       if (active.empty()) break;
       std::vector<FitRecord> records(active.size());
-      side_by_side(static_cast<int>(active.size()), [&](int k) {
+      for_each(static_cast<int>(active.size()), [&](int k) {
         FitCandidate& best = state_.candidates[active[k]];
         Optimizer& optimizer = *optimizers[active[k]];
         FitCandidate at = problem_.unpack(best.start, optimizer.ask(), state_.stage);
@@ -192,7 +192,7 @@ class Fit {
     const int next = state_.stage + 1;
     state_.epoch = 0;
     if (next < stages() && problem_.frames(next) != problem_.frames(state_.stage)) {
-      side_by_side(static_cast<int>(state_.candidates.size()), [&](int i) {
+      for_each(static_cast<int>(state_.candidates.size()), [&](int i) {
         FitCandidate& c = state_.candidates[i];
         const std::ptrdiff_t frames = problem_.frames(next);
         c.mse = mean_of_first(problem_.frame_mse(c, frames), frames);
@@ -215,7 +215,7 @@ class Fit {
     if (next + 1 < stages()) {
       std::set<std::string> seen;
       std::stable_partition(all.begin(), all.end(), [&](const FitCandidate& c) {
-        return seen.insert(unknowns_.label(c.start)).second;
+        return seen.insert(variables_.label(c.start)).second;
       });
     }
     if (all.size() > room) all.resize(room);
@@ -224,7 +224,7 @@ class Fit {
   /// The best start over all frames, in case that nothing improved on it.
   void add_best_start() {
     int best = 0;
-    for (int i = 1; i < unknowns_.starts(); ++i) {
+    for (int i = 1; i < variables_.starts(); ++i) {
       if (start_mse(i, stages() - 1) < start_mse(best, stages() - 1)) best = i;
     }
     FitCandidate candidate = start_candidate(best, stages() - 1);
@@ -237,13 +237,13 @@ class Fit {
       throw Error(fmt::format("{}: {}", hooks_.state_file.string(), what));
     };
     if (state_.stage < 0 || state_.stage > stages()) fail("stage out of range");
-    if (state_.start_mse.size() != static_cast<std::size_t>(unknowns_.starts() * stages())) {
+    if (state_.start_mse.size() != static_cast<std::size_t>(variables_.starts() * stages())) {
       fail("expected one loss a start and stage");
     }
     if (state_.candidates.empty()) fail("expected candidates, found none");
     for (const FitCandidate& c : state_.candidates) {
-      if (c.start < 0 || c.start >= unknowns_.starts() ||
-          static_cast<int>(c.u.size()) != unknowns_.size()) {
+      if (c.start < 0 || c.start >= variables_.starts() ||
+          static_cast<int>(c.u.size()) != variables_.size()) {
         fail("a candidate does not fit the model");
       }
     }
@@ -258,20 +258,20 @@ class Fit {
     r.start = best.start;
     r.history = state_.history;
     r.contact = problem_.contact();
-    for (int i = 0; i < unknowns_.starts(); ++i) {
+    for (int i = 0; i < variables_.starts(); ++i) {
       r.start_mse.push_back(start_mse(i, stages() - 1));
     }
     if (!std::isfinite(best.mse)) {
       throw Error(fmt::format("{}: no candidate can be simulated over all {} frames", name_,
                               problem_.frames()));
     }
-    r.law = unknowns_.law(r.u);
+    r.law = variables_.law(r.u);
     return r;
   }
 
   const FitProblem& problem_;
   const std::string& name_;
-  const Unknowns& unknowns_;
+  const FitVariables& variables_;
   const FitOptions& options_;
   const FitHooks& hooks_;
   FitState state_;
@@ -283,9 +283,9 @@ class Fit {
 }  // namespace
 
 FitResult fit_observation(const Observation& observation, const std::string& name,
-                          const Unknowns& unknowns, const FitOptions& options,
+                          const FitVariables& variables, const FitOptions& options,
                           const FitHooks& hooks) {
-  const FitProblem problem(observation, name, unknowns, options);
+  const FitProblem problem(observation, name, variables, options);
   return Fit(problem, name, options, hooks).run();
 }
 

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "uniphy/inference/fit_variables.hpp"
 #include "uniphy/inference/motion_objective.hpp"
 #include "uniphy/inference/optimizer.hpp"
-#include "uniphy/inference/unknowns.hpp"
 
 namespace uniphy {
 
@@ -65,7 +65,7 @@ struct FitResult {
 };
 
 struct FitHooks {
-  std::filesystem::path state_file;  ///< where the fit can be taken up again; empty: nowhere
+  std::filesystem::path state_file;  ///< where the fit can be resumed; empty: nowhere
   std::string fingerprint;           ///< of everything that the fit depends on
   double save_seconds = 2;           ///< least time between two saves
   std::function<void(const FitRecord&)> on_record;  ///< after every evaluation
@@ -87,14 +87,14 @@ struct FitHooks {
 /// Throws Error where no start can be simulated up to the first horizon, or where the state file
 /// does not belong to this fit.
 FitResult fit_observation(const Observation& observation, const std::string& name,
-                          const Unknowns& unknowns, const FitOptions& options,
+                          const FitVariables& variables, const FitOptions& options,
                           const FitHooks& hooks = {});
 
 /// Number of frames that a stage compares.
 std::ptrdiff_t horizon_frames(double horizon, std::ptrdiff_t contact, std::ptrdiff_t frames);
 
 /// The starts of the first stage, see fit_observation; loss_short and loss_full [starts].
-std::vector<int> choose_starts(const Unknowns& unknowns, const std::vector<double>& loss_short,
+std::vector<int> choose_starts(const FitVariables& variables, const std::vector<double>& loss_short,
                                const std::vector<double>& loss_full, int count);
 
 /// The state on disk (HDF5, format "uniphy-fit-state"). read throws Error where the file is damaged

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 
 namespace uniphy {
 namespace {
@@ -17,10 +17,10 @@ constexpr double kAngularUnit = 0.5;  // rad/s
 }  // namespace
 
 FitProblem::FitProblem(const Observation& observation, const std::string& name,
-                       const Unknowns& unknowns, const FitOptions& options)
+                       const FitVariables& variables, const FitOptions& options)
     : observation_(observation),
       name_(name),
-      unknowns_(unknowns),
+      variables_(variables),
       options_(options),
       steps_(observed_steps(observation, name)),
       grid_(observed_grid(observation, name)),
@@ -31,7 +31,7 @@ FitProblem::FitProblem(const Observation& observation, const std::string& name,
   if (options.stages.empty() || options.stages.back().horizon < 1) {
     throw Error("stages: expected a last stage with horizon 1");
   }
-  kernels::make_law<double>(unknowns.law(unknowns.start(0)));  // a model that does not fit: now
+  kernels::make_law<double>(variables.law(variables.start(0)));  // a model that does not fit: now
 }
 
 std::ptrdiff_t FitProblem::frames(int stage) const {
@@ -56,22 +56,22 @@ double FitProblem::prior_weight() const {
 
 double FitProblem::loss(double mse, const std::vector<double>& u) const {
   const double weight = prior_weight();
-  return mse / (size_ * size_) + (weight > 0 ? weight * unknowns_.prior(u, 0, nullptr) : 0);
+  return mse / (size_ * size_) + (weight > 0 ? weight * variables_.prior(u, 0, nullptr) : 0);
 }
 
 std::vector<double> FitProblem::frame_mse(const FitCandidate& c, std::ptrdiff_t frames) const {
-  return objective_->frame_mse(unknowns_.law(c.u), c.motion, frames);
+  return objective_->frame_mse(variables_.law(c.u), c.motion, frames);
 }
 
 std::vector<double> FitProblem::evaluate(FitCandidate& c, int stage) const {
-  const Evaluation e = objective_->evaluate(unknowns_.law(c.u), c.motion, frames(stage));
+  const Evaluation e = objective_->evaluate(variables_.law(c.u), c.motion, frames(stage));
   c.mse = e.mse;
   c.loss = std::isfinite(e.mse) ? loss(e.mse, c.u) : std::numeric_limits<double>::infinity();
   if (!std::isfinite(c.loss)) return {};
-  std::vector<double> g = unknowns_.gradient(c.u, e.parameters);
+  std::vector<double> g = variables_.gradient(c.u, e.parameters);
   const double unit = 1 / (size_ * size_);
   for (double& x : g) x *= unit;
-  if (prior_weight() > 0) unknowns_.prior(c.u, prior_weight(), &g);
+  if (prior_weight() > 0) variables_.prior(c.u, prior_weight(), &g);
   if (with_velocity(stage)) {
     for (int k = 0; k < 6; ++k) {
       g.push_back(unit * (k < 3 ? kLinearUnit : kAngularUnit) * e.motion[k]);
@@ -97,8 +97,8 @@ std::vector<double> FitProblem::pack(const FitCandidate& c, int stage) const {
 FitCandidate FitProblem::unpack(int start, const std::vector<double>& variables, int stage) const {
   FitCandidate c = candidate(start, variables);
   if (!with_velocity(stage)) return c;
-  const double* extra = variables.data() + unknowns_.size();
-  c.u.resize(unknowns_.size());
+  const double* extra = variables.data() + variables_.size();
+  c.u.resize(variables_.size());
   c.motion.linear += kLinearUnit * Eigen::Map<const Eigen::Vector3d>(extra);
   c.motion.angular += kAngularUnit * Eigen::Map<const Eigen::Vector3d>(extra + 3);
   return c;
@@ -107,7 +107,7 @@ FitCandidate FitProblem::unpack(int start, const std::vector<double>& variables,
 void FitProblem::refuse_starts() const {
   std::string reason = "the positions are not finite";
   try {
-    objective_->simulate(unknowns_.law(unknowns_.start(0)), motion_,
+    objective_->simulate(variables_.law(variables_.start(0)), motion_,
                          [](std::ptrdiff_t, const std::vector<double>&) {});
   } catch (const Error& error) {
     reason = error.what();
@@ -115,7 +115,7 @@ void FitProblem::refuse_starts() const {
   throw Error(fmt::format(
       "{}: expected that at least one of {} starts can be simulated for {} s, found none; the "
       "first: {}",
-      name_, unknowns_.starts(), horizon_time(0), reason));
+      name_, variables_.starts(), horizon_time(0), reason));
 }
 
 }  // namespace uniphy

@@ -8,17 +8,17 @@
 
 namespace uniphy {
 
-/// What a fit minimises: the observation, the unknowns and the horizons of the schedule in one,
+/// What a fit minimises: the observation, the variables and the horizons of the schedule in one,
 /// with the loss and its gradient at a candidate. Knows nothing of the order in which points are
 /// tried. Immutable, so that candidates can be evaluated side by side.
 class FitProblem {
  public:
   /// Keeps references to the arguments. Throws Error where the schedule has no last stage with
   /// horizon 1 or the model does not fit.
-  FitProblem(const Observation& observation, const std::string& name, const Unknowns& unknowns,
+  FitProblem(const Observation& observation, const std::string& name, const FitVariables& variables,
              const FitOptions& options);
 
-  const Unknowns& unknowns() const { return unknowns_; }
+  const FitVariables& variables() const { return variables_; }
   int stages() const { return static_cast<int>(options_.stages.size()); }
   std::ptrdiff_t contact() const { return contact_; }
   std::ptrdiff_t frames() const { return observation_.frames; }
@@ -49,7 +49,7 @@ class FitProblem {
 
   const Observation& observation_;
   const std::string& name_;
-  const Unknowns& unknowns_;
+  const FitVariables& variables_;
   const FitOptions& options_;
   ObservedSteps steps_;
   kernels::GridSettings grid_;

@@ -24,10 +24,10 @@ std::ptrdiff_t horizon_frames(double horizon, std::ptrdiff_t contact, std::ptrdi
   return std::clamp<std::ptrdiff_t>(from + more, 2, frames);
 }
 
-std::vector<int> choose_starts(const Unknowns& unknowns, const std::vector<double>& loss_short,
+std::vector<int> choose_starts(const FitVariables& variables, const std::vector<double>& loss_short,
                                const std::vector<double>& loss_full, int count) {
   std::vector<int> order;
-  for (int i = 0; i < unknowns.starts(); ++i) {
+  for (int i = 0; i < variables.starts(); ++i) {
     if (std::isfinite(loss_short[i])) order.push_back(i);
   }
   std::stable_sort(order.begin(), order.end(),
@@ -47,7 +47,7 @@ std::vector<int> choose_starts(const Unknowns& unknowns, const std::vector<doubl
   if (std::isfinite(loss_full[full])) add(full);
   std::set<std::string> seen;
   for (const int i : order) {
-    if (seen.insert(unknowns.label(i)).second) add(i);
+    if (seen.insert(variables.label(i)).second) add(i);
   }
   // The rest: in order of loss, at a distance from those chosen that shrinks until enough are
   // found.
@@ -56,7 +56,7 @@ std::vector<int> choose_starts(const Unknowns& unknowns, const std::vector<doubl
     for (const int i : order) {
       double nearest = std::numeric_limits<double>::infinity();
       for (const int j : chosen) {
-        nearest = std::min(nearest, distance(unknowns.start(i), unknowns.start(j)));
+        nearest = std::min(nearest, distance(variables.start(i), variables.start(j)));
       }
       if (nearest >= least) add(i);
     }

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "uniphy/inference/fit.hpp"
 #include "uniphy/io/hdf5.hpp"
 
@@ -36,7 +36,7 @@ std::vector<double> flat(const FitCandidate& c) {
   return row;
 }
 
-FitCandidate candidate(const double* row, std::size_t columns, std::size_t unknowns) {
+FitCandidate candidate(const double* row, std::size_t columns, std::size_t variables) {
   FitCandidate c;
   c.start = static_cast<int>(row[0]);
   c.loss = row[1];
@@ -46,8 +46,8 @@ FitCandidate candidate(const double* row, std::size_t columns, std::size_t unkno
   std::copy_n(row + 5, 3, c.motion.centre.data());
   std::copy_n(row + 8, 3, c.motion.linear.data());
   std::copy_n(row + 11, 3, c.motion.angular.data());
-  c.u.assign(row + kHeader, row + kHeader + unknowns);
-  c.optimizer.assign(row + kHeader + unknowns, row + columns);
+  c.u.assign(row + kHeader, row + kHeader + variables);
+  c.optimizer.assign(row + kHeader + variables, row + columns);
   return c;
 }
 
@@ -63,7 +63,7 @@ void write_fit_state(const std::filesystem::path& file, const FitState& state,
   writer.attribute("/", "epoch", state.epoch);
   writer.write("start_mse", state.start_mse, {static_cast<std::int64_t>(state.start_mse.size())},
                {"m^2", "of every start at the stages' horizons"});
-  writer.attribute("/", "unknowns",
+  writer.attribute("/", "variables",
                    state.candidates.empty() ? 0 : static_cast<int>(state.candidates[0].u.size()));
   Table candidates, history;
   for (const FitCandidate& c : state.candidates) candidates.add(flat(c));
@@ -103,11 +103,11 @@ FitState read_fit_state(const std::filesystem::path& file, const std::string& fi
       visit(data.data() + i * shape[1], static_cast<std::size_t>(shape[1]));
     }
   };
-  const auto unknowns = static_cast<std::size_t>(
-      std::clamp<std::int64_t>(reader.attribute_integer("/", "unknowns"), 0, 1 << 20));
-  rows("candidates", static_cast<std::int64_t>(kHeader + unknowns),
+  const auto variables = static_cast<std::size_t>(
+      std::clamp<std::int64_t>(reader.attribute_integer("/", "variables"), 0, 1 << 20));
+  rows("candidates", static_cast<std::int64_t>(kHeader + variables),
        [&](const double* row, std::size_t columns) {
-         state.candidates.push_back(candidate(row, columns, unknowns));
+         state.candidates.push_back(candidate(row, columns, variables));
        });
   rows("history", 5, [&](const double* row, std::size_t) {
     state.history.push_back(

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "uniphy/scene/law_config.hpp"
 
 namespace uniphy {
@@ -70,8 +70,8 @@ FitOptions read_fit_options(Section& config) {
   return options;
 }
 
-UnknownsSource read_unknowns(Section& config) {
-  UnknownsSource source;
+FitVariablesSource read_fit_variables(Section& config) {
+  FitVariablesSource source;
   Section law = config.section("law", "what is fitted");
   std::vector<Variant> variants;
   variants.push_back(
@@ -104,14 +104,14 @@ UnknownsSource read_unknowns(Section& config) {
   return source;
 }
 
-std::unique_ptr<const Unknowns> UnknownsSource::load() const {
-  if (id != kernels::LawId::learned) return make_analytic_unknowns(id, ranges, starts, seed);
+std::unique_ptr<const FitVariables> FitVariablesSource::load() const {
+  if (id != kernels::LawId::learned) return make_analytic_variables(id, ranges, starts, seed);
   const ModelFile file = read_model(model);
   if (file.codes() == 0) {
     throw Error(
         fmt::format("{}: /latents/z: expected codes to start from, found none", model.string()));
   }
-  return make_latent_unknowns(file);
+  return make_latent_variables(file);
 }
 
 }  // namespace uniphy

@@ -16,7 +16,7 @@ namespace uniphy {
 FitOptions read_fit_options(Section& config);
 
 /// What is fitted: the latent code of a model, or the parameters of an analytic law.
-struct UnknownsSource {
+struct FitVariablesSource {
   kernels::LawId id = kernels::LawId::learned;
   std::filesystem::path model;                ///< learned
   std::vector<std::array<double, 2>> ranges;  ///< analytic, in the order of parameter_names(id)
@@ -24,10 +24,10 @@ struct UnknownsSource {
   std::uint64_t seed = 0;
 
   /// Opens the model. Throws Error that names it.
-  std::unique_ptr<const Unknowns> load() const;
+  std::unique_ptr<const FitVariables> load() const;
 };
 
 /// Declares and reads the section `law`.
-UnknownsSource read_unknowns(Section& config);
+FitVariablesSource read_fit_variables(Section& config);
 
 }  // namespace uniphy

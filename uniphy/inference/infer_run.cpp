@@ -55,10 +55,10 @@ Trajectory observed_trajectory(const Observation& observation) {
   return t;
 }
 
-Inference infer(const Observation& observation, const std::string& name, const Unknowns& unknowns,
-                const FitOptions& options, const FitHooks& hooks) {
+Inference infer(const Observation& observation, const std::string& name,
+                const FitVariables& variables, const FitOptions& options, const FitHooks& hooks) {
   Inference result;
-  result.fit = fit_observation(observation, name, unknowns, options, hooks);
+  result.fit = fit_observation(observation, name, variables, options, hooks);
   result.size = observed_size(observation);
   const Trajectory seen = observed_trajectory(observation);
   result.fitted = seen;
@@ -76,8 +76,8 @@ Inference infer(const Observation& observation, const std::string& name, const U
   return result;
 }
 
-LatentFile latent_of(const Inference& inference, const Unknowns& unknowns, const std::string& model,
-                     const std::string& config) {
+LatentFile latent_of(const Inference& inference, const FitVariables& variables,
+                     const std::string& model, const std::string& config) {
   const FitResult& fit = inference.fit;
   LatentFile file;
   file.law = kernels::law_name(fit.law.id);
@@ -85,7 +85,7 @@ LatentFile latent_of(const Inference& inference, const Unknowns& unknowns, const
   if (fit.law.id == kernels::LawId::learned) {
     file.model = model;
     file.z = fit.law.z;
-    file.nearest = unknowns.nearest(fit.u, 5);
+    file.nearest = variables.nearest(fit.u, 5);
   } else {
     file.analytic = fit.law;
   }
@@ -97,7 +97,7 @@ LatentFile latent_of(const Inference& inference, const Unknowns& unknowns, const
 }
 
 void add_metrics(Metrics& metrics, const Inference& inference, const Observation& observation,
-                 const Unknowns& unknowns) {
+                 const FitVariables& variables) {
   const FitResult& fit = inference.fit;
   metrics.set("fit_mse", inference.fit_mse);
   metrics.set("fit_root_over_size", std::sqrt(inference.fit_mse) / inference.size);
@@ -116,14 +116,14 @@ void add_metrics(Metrics& metrics, const Inference& inference, const Observation
     metrics.set(fmt::format("velocity.{}", axes[k]), fit.motion.linear[k]);
     metrics.set(fmt::format("angular_velocity.{}", axes[k]), fit.motion.angular[k]);
   }
-  metrics.set("nearest.distance", unknowns.nearest(fit.u, 1).front().distance);
+  metrics.set("nearest.distance", variables.nearest(fit.u, 1).front().distance);
   kernels::LawDescription law = fit.law;
   for (const std::string& name : kernels::parameter_names(law.id)) {
     metrics.set("parameter." + name, law_parameter(law, name));
   }
 }
 
-Chart loss_chart(const FitResult& fit, const Unknowns& unknowns, const std::string& title) {
+Chart loss_chart(const FitResult& fit, const FitVariables& variables, const std::string& title) {
   Chart chart;
   chart.title = title;
   chart.x_label = "roll-outs of the candidate";
@@ -151,7 +151,7 @@ Chart loss_chart(const FitResult& fit, const Unknowns& unknowns, const std::stri
     if (line.stage != r.stage) line.best = std::numeric_limits<double>::infinity();
     line.stage = r.stage;
     line.best = std::min(line.best, r.mse);
-    line.series.label = fmt::format("start {} ({})", r.candidate, unknowns.label(r.candidate));
+    line.series.label = fmt::format("start {} ({})", r.candidate, variables.label(r.candidate));
     line.series.x.push_back(offset[r.stage] + r.epoch + 1);
     line.series.y.push_back(line.best);
   }
@@ -180,7 +180,7 @@ ParticlePicture frames_picture(const std::vector<std::pair<std::string, const Tr
   return picture;
 }
 
-std::string fit_fingerprint(const Observation& observation, const Unknowns& unknowns,
+std::string fit_fingerprint(const Observation& observation, const FitVariables& variables,
                             const std::string& text) {
   Hash hash;
   hash.add(observation.x);
@@ -190,8 +190,8 @@ std::string fit_fingerprint(const Observation& observation, const Unknowns& unkn
                        observation.gravity[0], observation.gravity[1], observation.gravity[2],
                        observation.walls, observation.bound));
   hash.add(std::vector<double>{observation.density});
-  for (int i = 0; i < unknowns.starts(); ++i) hash.add(unknowns.start(i));
-  add_weights(hash, unknowns.law(unknowns.start(0)));
+  for (int i = 0; i < variables.starts(); ++i) hash.add(variables.start(i));
+  add_weights(hash, variables.law(variables.start(0)));
   hash.add(text);
   return hash.text();
 }

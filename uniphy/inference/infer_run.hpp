@@ -21,21 +21,21 @@ struct Inference {
 };
 
 /// Fits and rolls out once more. Throws Error.
-Inference infer(const Observation& observation, const std::string& name, const Unknowns& unknowns,
-                const FitOptions& options, const FitHooks& hooks);
+Inference infer(const Observation& observation, const std::string& name,
+                const FitVariables& variables, const FitOptions& options, const FitHooks& hooks);
 
 /// The product of uniphy_infer. `model` is the path that resimulate will look for.
-LatentFile latent_of(const Inference& inference, const Unknowns& unknowns, const std::string& model,
-                     const std::string& config);
+LatentFile latent_of(const Inference& inference, const FitVariables& variables,
+                     const std::string& model, const std::string& config);
 
 /// fit_mse (m²), fit_root_over_size, size, best_start_mse, roll_outs, starts, starts_failed,
 /// contact_s, velocity.{x,y,z}, angular_velocity.{x,y,z}, nearest.distance and, of an analytic law,
 /// parameter.NAME.
 void add_metrics(Metrics& metrics, const Inference& inference, const Observation& observation,
-                 const Unknowns& unknowns);
+                 const FitVariables& variables);
 
 /// The best mse so far of every start that was followed, over the roll-outs of all stages.
-Chart loss_chart(const FitResult& fit, const Unknowns& unknowns, const std::string& title);
+Chart loss_chart(const FitResult& fit, const FitVariables& variables, const std::string& title);
 
 /// `columns` frames of several trajectories of the same number of frames, one row each.
 ParticlePicture frames_picture(const std::vector<std::pair<std::string, const Trajectory*>>& rows,
@@ -46,7 +46,7 @@ Trajectory observed_trajectory(const Observation& observation);
 
 /// 64 bits of everything in the observation and the starts, beside `text`, as hexadecimal digits:
 /// tells whether an interrupted fit can go on.
-std::string fit_fingerprint(const Observation& observation, const Unknowns& unknowns,
+std::string fit_fingerprint(const Observation& observation, const FitVariables& variables,
                             const std::string& text);
 
 }  // namespace uniphy

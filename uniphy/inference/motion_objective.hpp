@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "ops/kernels/law.hpp"
-#include "ops/kernels/rollout.hpp"
+#include "ops/kernels/laws/law.hpp"
+#include "ops/kernels/rollout/rollout.hpp"
 #include "uniphy/inference/observed_motion.hpp"
 
 namespace uniphy {

@@ -8,8 +8,8 @@
 #include <cstdint>
 #include <numeric>
 
-#include "ops/kernels/error.hpp"
-#include "ops/kernels/rollout.hpp"
+#include "ops/kernels/base/error.hpp"
+#include "ops/kernels/rollout/rollout.hpp"
 
 namespace uniphy {
 namespace {

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "ops/kernels/grid.hpp"
+#include "ops/kernels/mpm/grid.hpp"
 #include "uniphy/inference/rigid_motion.hpp"
 #include "uniphy/io/observation.hpp"
 

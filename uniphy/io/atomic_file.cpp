@@ -9,7 +9,7 @@
 #include <fstream>
 #include <system_error>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 
 namespace uniphy {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 
 namespace uniphy {
 namespace {

@@ -7,7 +7,7 @@
 #include <cstring>
 #include <limits>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "uniphy/io/hdf5_handle.hpp"
 #include "uniphy/io/hdf5_reader_impl.hpp"
 

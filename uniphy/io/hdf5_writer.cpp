@@ -5,7 +5,7 @@
 #include <cstring>
 #include <map>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "uniphy/io/atomic_file.hpp"
 #include "uniphy/io/hdf5_handle.hpp"
 

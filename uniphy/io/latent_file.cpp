@@ -4,7 +4,7 @@
 
 #include <limits>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "uniphy/io/hdf5.hpp"
 
 namespace uniphy {

@@ -20,7 +20,7 @@
 #include <string>
 #include <vector>
 
-#include "ops/kernels/law.hpp"
+#include "ops/kernels/laws/law.hpp"
 
 namespace uniphy {
 

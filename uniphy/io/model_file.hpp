@@ -2,7 +2,7 @@
 
 // model.h5: a trained law and the latent codes of the trajectories it was trained on.
 //
-//   attributes  format = "uniphy-model", version = 1, form = "isotropic" | "seed",
+//   attributes  format = "uniphy-model", version = 1, form = "isotropic" | "published",
 //               latent_size, activation = "gelu" | "silu" | "squareplus", dtype = "float64",
 //               stress_units = "Pa", rate_units = "1/s", config = YAML that trained it
 //   /projection/layer_k/weight [out, in], bias [out]   k = 0, 1, ...
@@ -11,14 +11,15 @@
 //   /latents/material   [N]     name of the law behind each code
 //   /latents/parameters [N, 5]  mu, lambda, tau_y, theta, eta of that law, NaN where it has none
 //
-// The inputs of the first layers, their order and units: ops/kernels/learned_law_weights.hpp.
+// The inputs of the first layers, their order and units:
+// ops/kernels/learned/learned_law_weights.hpp.
 
 #include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
 
-#include "ops/kernels/learned_law_weights.hpp"
+#include "ops/kernels/learned/learned_law_weights.hpp"
 #include "uniphy/io/dataset.hpp"
 
 namespace uniphy {

@@ -15,7 +15,7 @@
 #include <string>
 #include <vector>
 
-#include "ops/kernels/grid.hpp"
+#include "ops/kernels/mpm/grid.hpp"
 
 namespace uniphy {
 

@@ -13,7 +13,7 @@
 #include <cstdio>
 #include <tuple>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "uniphy/io/atomic_file.hpp"
 #include "uniphy/report/interrupt.hpp"
 

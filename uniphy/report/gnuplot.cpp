@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "uniphy/io/atomic_file.hpp"
 #include "uniphy/report/plot.hpp"
 

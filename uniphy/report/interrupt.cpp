@@ -7,7 +7,7 @@
 #include <csignal>
 #include <cstdint>
 
-#include "ops/kernels/between_steps.hpp"
+#include "ops/kernels/base/between_steps.hpp"
 
 namespace uniphy {
 namespace {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "uniphy/report/gnuplot.hpp"
 #include "uniphy/report/plot.hpp"
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "ops/kernels/law.hpp"
+#include "ops/kernels/laws/law.hpp"
 #include "uniphy/geometry/particle_cloud.hpp"
 #include "uniphy/geometry/solid.hpp"
 

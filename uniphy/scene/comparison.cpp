@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 
 namespace uniphy {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "uniphy/io/latent_file.hpp"
 #include "uniphy/io/model_file.hpp"
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "ops/kernels/law.hpp"
+#include "ops/kernels/laws/law.hpp"
 #include "uniphy/config/config.hpp"
 
 namespace uniphy {

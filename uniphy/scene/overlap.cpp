@@ -8,7 +8,7 @@
 #include <numeric>
 #include <unordered_map>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 
 namespace uniphy {
 namespace {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "uniphy/scene/overlap.hpp"
 
 namespace uniphy {

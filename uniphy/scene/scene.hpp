@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "ops/kernels/rollout.hpp"
+#include "ops/kernels/rollout/rollout.hpp"
 #include "uniphy/io/trajectory.hpp"
 #include "uniphy/scene/body.hpp"
 #include "uniphy/scene/time_step.hpp"

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 
 namespace uniphy {
 namespace {

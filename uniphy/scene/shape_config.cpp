@@ -3,7 +3,7 @@
 #include <array>
 #include <utility>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "uniphy/geometry/fill.hpp"
 #include "uniphy/geometry/shapes/blobby.hpp"
 #include "uniphy/geometry/shapes/box.hpp"

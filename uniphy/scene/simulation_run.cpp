@@ -6,7 +6,7 @@
 #include <chrono>
 #include <numeric>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "uniphy/io/observation.hpp"
 #include "uniphy/report/plot.hpp"
 #include "uniphy/report/progress.hpp"

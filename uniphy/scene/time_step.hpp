@@ -1,6 +1,6 @@
 #pragma once
 
-#include "ops/kernels/law.hpp"
+#include "ops/kernels/laws/law.hpp"
 
 namespace uniphy {
 

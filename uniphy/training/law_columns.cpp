@@ -2,13 +2,13 @@
 
 #include <cmath>
 
-#include "ops/kernels/learned_law_weights.hpp"
-#include "ops/kernels/spectral.hpp"
+#include "ops/kernels/learned/learned_law_weights.hpp"
+#include "ops/kernels/spectral/spectral.hpp"
 
 namespace uniphy {
 namespace {
 
-using kernels::IsotropicColumns;
+using kernels::SampleColumns;
 using Mat3 = kernels::Mat3<double>;
 
 Mat3 load(const std::vector<double>& values, std::int64_t sample) {
@@ -29,7 +29,7 @@ void put_symmetric(float* to, const Mat3& m) {
 constexpr double kNoDecrease = 1e-11;
 
 void isotropic_columns(const Dataset& data, std::int64_t s, float* row) {
-  using Column = IsotropicColumns;
+  using Column = SampleColumns;
   const Mat3 F = load(data.samples.F, s), P = load(data.samples.F_proj, s);
   const auto trial = kernels::hencky_strain(kernels::svd3(F).sigma, false);
   const auto svd = kernels::svd3(P);
@@ -49,8 +49,8 @@ void isotropic_columns(const Dataset& data, std::int64_t s, float* row) {
   put_symmetric(row + Column::stress, tmul(svd.U, mul(load(data.samples.tau, s), svd.U)));
 }
 
-void seed_columns(const Dataset& data, std::int64_t s, float* row) {
-  using Column = SeedColumns;
+void published_columns(const Dataset& data, std::int64_t s, float* row) {
+  using Column = PublishedColumns;
   const Mat3 F = load(data.samples.F, s), P = load(data.samples.F_proj, s);
   const auto trial = kernels::svd3(F), svd = kernels::svd3(P);
   float* in = row + Column::projection_in;
@@ -77,13 +77,13 @@ void seed_columns(const Dataset& data, std::int64_t s, float* row) {
 LawColumns law_columns(const Dataset& data, kernels::LawForm form) {
   LawColumns result;
   const bool isotropic = form == kernels::LawForm::isotropic;
-  result.columns = isotropic ? int{IsotropicColumns::count} : int{SeedColumns::count};
+  result.columns = isotropic ? int{SampleColumns::count} : int{PublishedColumns::count};
   const std::int64_t samples = data.samples.size();
   result.values.resize(std::size_t(samples * result.columns));
 #pragma omp parallel for schedule(static)
   for (std::int64_t s = 0; s < samples; ++s) {
     float* row = result.values.data() + s * result.columns;
-    isotropic ? isotropic_columns(data, s, row) : seed_columns(data, s, row);
+    isotropic ? isotropic_columns(data, s, row) : published_columns(data, s, row);
   }
   const std::int64_t trajectories = std::int64_t(data.trajectories.size());
   result.scales.resize(std::size_t(trajectories));

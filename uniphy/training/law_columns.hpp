@@ -4,14 +4,14 @@
 #include <cstdint>
 #include <vector>
 
-#include "ops/kernels/isotropic_columns.hpp"
-#include "ops/kernels/learned_law_weights.hpp"
+#include "ops/kernels/learned/learned_law_weights.hpp"
+#include "ops/kernels/loss/sample_columns.hpp"
 #include "uniphy/io/dataset.hpp"
 
 namespace uniphy {
 
-/// What the seed form sees: its input features, Δ = F_proj − F, and Rᵀ τ R.
-struct SeedColumns {
+/// What the published form sees: its input features, Δ = F_proj − F, and Rᵀ τ R.
+struct PublishedColumns {
   enum Column {
     projection_in = 0,  ///< F, U, Σ, Vᵀ: 30
     stress_in = 30,  ///< Σ, FᵀF, J, log J, F_max, log F_max, RᵀCR t₀ of the projected F: 25
@@ -34,7 +34,7 @@ struct LawColumns {
   std::vector<TrajectoryScale> scales;  ///< [N]
 };
 
-/// The columns of a form, SeedColumns or kernels::IsotropicColumns, for every sample, in float64
+/// The columns of a form, PublishedColumns or kernels::SampleColumns, for every sample, in float64
 /// arithmetic, stored as float32.
 LawColumns law_columns(const Dataset& data, kernels::LawForm form);
 

@@ -5,7 +5,7 @@
 #include <limits>
 #include <map>
 
-#include "ops/kernels/law.hpp"
+#include "ops/kernels/laws/law.hpp"
 
 namespace uniphy {
 namespace {

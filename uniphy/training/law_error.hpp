@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "ops/kernels/learned_law_weights.hpp"
+#include "ops/kernels/learned/learned_law_weights.hpp"
 #include "uniphy/io/dataset.hpp"
 #include "uniphy/report/metrics.hpp"
 

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "ops/kernels/learned_law_weights.hpp"
-#include "ops/mlp.hpp"
+#include "ops/kernels/learned/learned_law_weights.hpp"
+#include "ops/mlp/mlp.hpp"
 
 namespace uniphy {
 

@@ -52,15 +52,15 @@ LawErrors Objective::isotropic(const Networks& networks, const Tensor& z, const 
   answers.moduli_rest = network(networks.stress, networks, torch::zeros({n, 1, 6}), z);
   answers.moduli = options.state_moduli ? network(networks.stress, networks, features.stress, z)
                                         : answers.moduli_rest;
-  const ops::IsotropicErrors e = ops::isotropic_errors(batch, scale, z, answers, measure_);
+  const ops::LawLosses e = ops::law_losses(batch, scale, z, answers, measure_);
   const auto loss = [&e](kernels::IsotropicMean k) { return e.losses.select(1, k); };
   return {loss(kernels::kStressLoss), loss(kernels::kProjectionLoss), loss(kernels::kWholeLoss),
           loss(kernels::kShare),      e.errors.select(1, 0),          e.errors.select(1, 1)};
 }
 
-LawErrors Objective::seed(const Networks& networks, const Tensor& z, const Tensor& rows,
-                          const Tensor& scale) const {
-  using Column = SeedColumns;
+LawErrors Objective::published(const Networks& networks, const Tensor& z, const Tensor& rows,
+                               const Tensor& scale) const {
+  using Column = PublishedColumns;
   const Tensor batch = columns_.index_select(0, rows.reshape({-1}))
                            .view({rows.size(0), rows.size(1), columns_.size(1)});
   const auto columns = [&batch](int first, int count) { return batch.narrow(2, first, count); };

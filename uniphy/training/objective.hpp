@@ -2,7 +2,7 @@
 
 #include <torch/torch.h>
 
-#include "ops/isotropic_errors.hpp"
+#include "ops/loss/law_losses.hpp"
 #include "uniphy/training/law_columns.hpp"
 #include "uniphy/training/networks.hpp"
 
@@ -18,7 +18,7 @@ struct LawErrors {
   torch::Tensor stress_loss;
   torch::Tensor projection_loss;
   // Isotropic form, else undefined: the projection's loss if the whole of what exceeds the cap were
-  // taken off, and the share that is (formulas: ops/kernels/isotropic_errors_table.hpp).
+  // taken off, and the share that is (formulas: ops/kernels/loss/law_losses_table.hpp).
   torch::Tensor whole_loss;
   torch::Tensor share;
   // The squared errors themselves, for reports: they have no gradient.
@@ -50,8 +50,8 @@ class Objective {
  private:
   LawErrors isotropic(const Networks& networks, const torch::Tensor& z, const torch::Tensor& rows,
                       const torch::Tensor& scale) const;
-  LawErrors seed(const Networks& networks, const torch::Tensor& z, const torch::Tensor& rows,
-                 const torch::Tensor& scale) const;
+  LawErrors published(const Networks& networks, const torch::Tensor& z, const torch::Tensor& rows,
+                      const torch::Tensor& scale) const;
 
   kernels::LawForm form_;
   ops::ErrorMeasure measure_;

@@ -8,7 +8,7 @@
 #include <limits>
 #include <optional>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "uniphy/report/interrupt.hpp"
 #include "uniphy/report/progress.hpp"
 #include "uniphy/training/batches.hpp"
@@ -160,7 +160,7 @@ Tensor fit_latents(const Dataset& data, const Networks& trained, const Tensor& t
   }
   progress.finish();
   torch::NoGradGuard no_grad;
-  // Some starts lead astray, to scales at which nothing is finite any more; the training code that
+  // Some starts fail, to scales at which nothing is finite any more; the training code that
   // answers best is finite.
   const Tensor fitted = torch::cat({z.detach(), initial.narrow(0, 0, n)});
   const Tensor final_scores = loss_of(fitted, sampler.rows(-2, 256).repeat({starts + 1, 1}),

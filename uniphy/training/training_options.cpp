@@ -7,8 +7,8 @@ TrainingOptions read_training_options(Section& config, const TrainingOptions& de
   TrainingOptions options = defaults;
   Section model = config.section("model", "the form and size of the law");
   NetworkOptions& network = options.network;
-  network.form = kernels::form_from_name(model.choice("form", kernels::form_name(network.form),
-                                                      {"isotropic", "seed"}, "form of the law"));
+  network.form = kernels::form_from_name(model.choice(
+      "form", kernels::form_name(network.form), {"isotropic", "published"}, "form of the law"));
   network.activation = kernels::activation_from_name(
       model.choice("activation", kernels::activation_name(network.activation),
                    {"gelu", "silu", "squareplus"}, "of the hidden layers"));

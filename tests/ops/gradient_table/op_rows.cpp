@@ -1,5 +1,5 @@
 #include "tests/ops/gradient_table/rows.hpp"
-#include "tests/support/isotropic_error_tensors.hpp"
+#include "tests/support/law_loss_tensors.hpp"
 #include "tests/support/learned_law_cases.hpp"
 #include "tests/support/mpm_op_cases.hpp"
 #include "tests/support/network_cases.hpp"
@@ -9,7 +9,7 @@ namespace uniphy::testing {
 
 std::vector<GradientRow> learned_law_rows() {
   std::vector<GradientRow> rows;
-  for (const auto form : {kernels::LawForm::isotropic, kernels::LawForm::seed}) {
+  for (const auto form : {kernels::LawForm::isotropic, kernels::LawForm::published}) {
     const LearnedLawErrors errors = learned_law_errors(form);
     const std::string op = std::string("learned law, ") + kernels::form_name(form);
     rows.push_back({op, "F", errors.F});
@@ -37,7 +37,7 @@ std::vector<GradientRow> op_rows() {
     add(op, "biases", errors.biases);
   }
   for (const bool state : {false, true}) {
-    const auto errors = isotropic_gradient_errors(isotropic_error_case(4, 37, state, state));
+    const auto errors = isotropic_gradient_errors(law_loss_case(4, 37, state, state));
     const char* const leaves[] = {"z", "caps", "caps at rest", "moduli", "moduli at rest"};
     for (std::size_t k = 0; k < errors.size(); ++k)
       add(state ? "training errors, state" : "training errors", leaves[k], errors[k]);

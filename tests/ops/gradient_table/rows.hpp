@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "ops/kernels/isa.hpp"
+#include "ops/kernels/simd/isa.hpp"
 
 namespace uniphy::testing {
 

@@ -53,22 +53,24 @@ TEST(Bench, MeasuresEveryNumberOfTheTable) {
   const Metrics metrics = Metrics::read(scratch.file("out/metrics.json"));
   for (const char* name :
        {"fma_gflops_core", "svd3_f32_ns", "svd3_f32_speedup", "mpm_step_f32_fwd_ns",
-        "mpm_step_f32_bwd_ns", "mpm_step_speedup", "law_seed_fwd_peak_share",
-        "law_seed_bwd_over_fwd", "law_seed_speedup", "law_isotropic_over_seed", "epoch_seed_s",
-        "epoch_isotropic_s", "second_core_min", "per_particle_spread", "train_speedup"}) {
+        "mpm_step_f32_bwd_ns", "mpm_step_speedup", "law_published_fwd_peak_share",
+        "law_published_bwd_over_fwd", "law_published_speedup", "law_isotropic_over_published",
+        "epoch_published_s", "epoch_isotropic_s", "second_core_min", "per_particle_spread",
+        "train_speedup"}) {
     ASSERT_TRUE(metrics.find(name)) << name;
     EXPECT_GT(*metrics.find(name), 0) << name;
   }
-  for (const char* name : {"epoch_seed_mb", "epoch_isotropic_mb"}) {
+  for (const char* name : {"epoch_published_mb", "epoch_isotropic_mb"}) {
     ASSERT_TRUE(metrics.find(name)) << name;
     EXPECT_GE(*metrics.find(name), 0) << name;  // so little that the heap may have it already
   }
-  for (const char* part : {"svd3 f32", "law sand", "learned seed", "mpm step", "epoch isotropic",
-                           "train isotropic", "goal", "second core"}) {
+  for (const char* part : {"svd3 f32", "law sand", "learned published", "mpm step",
+                           "epoch isotropic", "train isotropic", "goal", "second core"}) {
     EXPECT_THAT(result.out, HasSubstr(part));
   }
   EXPECT_THAT(read_text_file(scratch.file("out/table.txt")), result.out);
-  EXPECT_THAT(read_text_file(scratch.file("out/rows.csv")), HasSubstr("learned seed,backward,70,"));
+  EXPECT_THAT(read_text_file(scratch.file("out/rows.csv")),
+              HasSubstr("learned published,backward,70,"));
   EXPECT_EQ(std::filesystem::exists(scratch.file("out/roofline.png")), gnuplot_available());
 }
 

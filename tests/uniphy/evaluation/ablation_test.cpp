@@ -22,7 +22,7 @@ std::string config(const std::string& budget, const std::string& variants) {
 
 constexpr const char* kTwo =
     "  - {name: base, group: form}\n"
-    "  - {name: seed, group: form, trajectories: 1, model: {form: seed, width: 6}}\n";
+    "  - {name: published, group: form, trajectories: 1, model: {form: published, width: 6}}\n";
 
 TEST(Ablation, KeepsFinishedVariants) {
   const testing::Scratch scratch;
@@ -33,7 +33,7 @@ TEST(Ablation, KeepsFinishedVariants) {
   EXPECT_EQ(first.find("base.parameters"), 56 + 8 + 36 + 80 + 8 + 72);
   for (const char* name : {"law_ns", "train_s", "stress_error", "rollout_error.sand.worst",
                            "projection_error.newtonian", "rollouts_failed"}) {
-    EXPECT_TRUE(first.find(std::string("seed.") + name)) << name;
+    EXPECT_TRUE(first.find(std::string("published.") + name)) << name;
   }
   EXPECT_GT(*first.find("base.law_ns"), 0);
   const std::string table = read_text_file(scratch.file("out/ablation.md"));
@@ -45,7 +45,7 @@ TEST(Ablation, KeepsFinishedVariants) {
   // A second run reads what is there, times and all; a variant that was lost is made again, to the
   // same bits.
   EXPECT_EQ(testing::run_stage(ablation_stage, yaml, scratch.file("out")).json(), first.json());
-  std::filesystem::remove_all(scratch.file("out/seed"));
+  std::filesystem::remove_all(scratch.file("out/published"));
   const Metrics again = testing::run_stage(ablation_stage, yaml, scratch.file("out"), 1);
   EXPECT_EQ(again.find("base.train_s"), first.find("base.train_s"));
   EXPECT_EQ(again.find("seed.stress_error"), first.find("seed.stress_error"));

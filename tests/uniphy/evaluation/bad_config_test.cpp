@@ -94,9 +94,9 @@ INSTANTIATE_TEST_SUITE_P(
             "variants:\n  - {name: a, model: {latent_size: 1}}\n",
             "c.yaml:2: variants.0.model.latent_size: expected 2 or more: form isotropic takes "
             "its scales from two"},
-        BadConfig{
-            "UnknownForm", ablation_stage, "variants:\n  - {name: a, model: {form: cubic}}\n",
-            "c.yaml:2: variants.0.model.form: expected one of isotropic, seed, found \"cubic\""},
+        BadConfig{"UnknownForm", ablation_stage, "variants:\n  - {name: a, model: {form: cubic}}\n",
+                  "c.yaml:2: variants.0.model.form: expected one of isotropic, published, found "
+                  "\"cubic\""},
         BadConfig{"UnknownBudget", ablation_stage,
                   "budget: {type: hours}\nvariants:\n  - {name: a}\n",
                   "c.yaml:1: budget.type: expected one of steps, seconds, found \"hours\""},

@@ -78,10 +78,10 @@ TEST(FrameIndifference, IsMissedByAPlainNetworkAndNotByAnIsotropicOne) {
   EXPECT_LT(isotropic.stress, 1e-7);
   EXPECT_LT(isotropic.projection, 1e-12);
   // One plain network among them is enough.
-  laws[2] = random_law(kernels::LawForm::seed);
-  const FrameIndifference seed = frame_indifference(data, laws, 1);
-  EXPECT_GT(seed.stress, 1e-2);
-  EXPECT_GT(seed.projection, 1e-2);
+  laws[2] = random_law(kernels::LawForm::published);
+  const FrameIndifference published = frame_indifference(data, laws, 1);
+  EXPECT_GT(published.stress, 1e-2);
+  EXPECT_GT(published.projection, 1e-2);
 }
 
 TEST(FrameIndifference, KeepsWhatIsNotANumber) {
@@ -108,7 +108,7 @@ TEST(RestDrift, ShowsALawThatPushesAndOneThatBursts) {
   RestOptions options;
   options.steps = 20;
   options.particles = 27;
-  kernels::LawDescription pushes = random_law(kernels::LawForm::seed), bursts = pushes;
+  kernels::LawDescription pushes = random_law(kernels::LawForm::published), bursts = pushes;
   pushes.z[0] = -3;  // 1 Pa
   bursts.z[0] = 5;   // 1e10 Pa
   ::testing::internal::CaptureStderr();

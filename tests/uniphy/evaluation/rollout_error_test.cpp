@@ -6,7 +6,7 @@
 
 #include <cmath>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "tests/support/random_weights.hpp"
 #include "tests/uniphy/evaluation/small_run.hpp"
 #include "uniphy/data/generate.hpp"
@@ -53,7 +53,7 @@ TEST(RolloutError, AFailureIsInfiniteAndSaysWhy) {
   auto laws = own_laws(all);
   laws[2].id = kernels::LawId::learned;
   laws[2].weights = std::make_shared<kernels::LearnedLawWeights>(
-      testing::random_weights(kernels::LawForm::seed, 4, 8, 1, kernels::Activation::silu, 5));
+      testing::random_weights(kernels::LawForm::published, 4, 8, 1, kernels::Activation::silu, 5));
   laws[2].z = {5, 0, 0, 0};  // 1e10 Pa at rest
   const auto errors = rollout_errors(all, laws);
   EXPECT_TRUE(std::isinf(errors[2].root_over_size));

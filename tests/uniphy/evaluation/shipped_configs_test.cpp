@@ -55,21 +55,21 @@ TEST(ShippedConfigs, AblateEverySizeOfTheIssue) {
   const AblationOptions o = read_ablation_options(root);
   EXPECT_NO_THROW(config.finish());
   std::vector<std::int64_t> widths, latents, trajectories;
-  int seed_form = 0;
+  int published_form = 0;
   for (const AblationVariant& v : o.variants) {
     const NetworkOptions& n = v.training.network;
     EXPECT_EQ(v.training.steps, o.variants[0].training.steps) << v.name;
     // Every step of every variant sees as many samples, to 2 %.
     EXPECT_NEAR(static_cast<double>(v.trajectories * v.training.batch_per_trajectory), 2560, 52);
-    if (n.form == kernels::LawForm::seed) {
-      ++seed_form;
+    if (n.form == kernels::LawForm::published) {
+      ++published_form;
       continue;
     }
     widths.push_back(n.width);
     latents.push_back(n.latent_size);
     trajectories.push_back(v.trajectories);
   }
-  EXPECT_GE(seed_form, 1);
+  EXPECT_GE(published_form, 1);
   const auto has = [](const std::vector<std::int64_t>& list, std::int64_t value) {
     return std::find(list.begin(), list.end(), value) != list.end();
   };

@@ -4,7 +4,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "uniphy/geometry/fill.hpp"
 #include "uniphy/geometry/random.hpp"
 #include "uniphy/geometry/triangle_mesh.hpp"

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <functional>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "uniphy/geometry/shape_catalogue.hpp"
 #include "uniphy/geometry/shapes/blobby.hpp"
 #include "uniphy/geometry/shapes/box.hpp"

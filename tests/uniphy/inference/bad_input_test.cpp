@@ -38,15 +38,15 @@ TEST_P(BadObservations, AreRefused) {
   scene.frames = 4;
   Observation o = testing::observe(testing::elastic_body(), scene);
   GetParam().spoil(o);
-  const auto unknowns =
-      make_analytic_unknowns(kernels::LawId::elastic, {{1e4, 2e4}, {1e4, 2e4}}, 2, 1);
+  const auto variables =
+      make_analytic_variables(kernels::LawId::elastic, {{1e4, 2e4}, {1e4, 2e4}}, 2, 1);
   const testing::Scratch scratch;
   const std::string file = scratch.file("seen.h5").string();
   const std::string message = testing::error_of([&] {
     write_observation(file, o);
     FitHooks hooks;
     hooks.progress = false;
-    fit_observation(read_observation(file), file, *unknowns, one_stage(), hooks);
+    fit_observation(read_observation(file), file, *variables, one_stage(), hooks);
   });
   EXPECT_THAT(message, HasSubstr("seen.h5: "));
   EXPECT_THAT(message, HasSubstr(GetParam().message));
@@ -85,19 +85,19 @@ TEST(BadObservationPlace, ABodyOutsideTheGridIsRefusedWithItsParticle) {
   scene.frames = 4;
   Observation o = testing::observe(testing::elastic_body(), scene);
   for (double& x : o.x) x += 0.6;
-  const auto unknowns =
-      make_analytic_unknowns(kernels::LawId::elastic, {{1e4, 2e4}, {1e4, 2e4}}, 2, 1);
+  const auto variables =
+      make_analytic_variables(kernels::LawId::elastic, {{1e4, 2e4}, {1e4, 2e4}}, 2, 1);
   FitHooks hooks;
   hooks.progress = false;
   EXPECT_THAT(
-      testing::error_of([&] { fit_observation(o, "seen.h5", *unknowns, one_stage(), hooks); }),
+      testing::error_of([&] { fit_observation(o, "seen.h5", *variables, one_stage(), hooks); }),
       HasSubstr("particle"));
 }
 
 struct Interrupted {
   testing::Scratch scratch;
   Observation observation;
-  std::unique_ptr<const Unknowns> unknowns;
+  std::unique_ptr<const FitVariables> variables;
   FitHooks hooks;
 
   Interrupted() {
@@ -105,14 +105,14 @@ struct Interrupted {
     scene.side = 3;
     scene.frames = 21;
     observation = testing::observe(testing::elastic_body(), scene);
-    unknowns = make_analytic_unknowns(kernels::LawId::elastic, {{1e4, 2e4}, {1e4, 2e4}}, 2, 1);
+    variables = make_analytic_variables(kernels::LawId::elastic, {{1e4, 2e4}, {1e4, 2e4}}, 2, 1);
     hooks.progress = false;
     hooks.save_seconds = 0;
     hooks.state_file = scratch.file("state.h5");
     hooks.fingerprint = "abc";
     run();
   }
-  void run() { fit_observation(observation, "seen.h5", *unknowns, one_stage(), hooks); }
+  void run() { fit_observation(observation, "seen.h5", *variables, one_stage(), hooks); }
 };
 
 TEST(BadState, OfAnotherFitIsRefused) {
@@ -149,7 +149,7 @@ TEST(Fingerprint, SeesEverythingThatAFitDependsOn) {
   const Observation o = testing::observe(testing::elastic_body());
   const ModelFile model = testing::readable_model();
   const auto of = [](const Observation& seen, const ModelFile& m, const std::string& text) {
-    return fit_fingerprint(seen, *make_latent_unknowns(m), text);
+    return fit_fingerprint(seen, *make_latent_variables(m), text);
   };
   const std::string before = of(o, model, "a");
   EXPECT_EQ(before, of(o, model, "a"));
@@ -244,7 +244,7 @@ TEST_P(BadFitConfigs, AreRefused) {
   EXPECT_THAT(testing::error_of([&] {
                 Config config = Config::parse(GetParam().yaml, "infer.yaml");
                 Section root = config.root();
-                read_unknowns(root);
+                read_fit_variables(root);
                 read_fit_options(root);
                 config.finish();
               }),
@@ -267,11 +267,11 @@ INSTANTIATE_TEST_SUITE_P(
         BadConfig{"UnknownKey", "shedule: {rate: 1}", "shedule"}),
     [](const auto& info) { return std::string(info.param.name); });
 
-TEST(Unknowns, AModelWithoutCodesIsRefused) {
+TEST(FitVariables, AModelWithoutCodesIsRefused) {
   ModelFile model = testing::readable_model();
   model.latents.clear();
   model.materials.clear();
-  EXPECT_THAT(testing::error_of([&] { make_latent_unknowns(model); }),
+  EXPECT_THAT(testing::error_of([&] { make_latent_variables(model); }),
               HasSubstr("expected latent codes to start from"));
 }
 

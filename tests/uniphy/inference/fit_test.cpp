@@ -31,12 +31,12 @@ FitOptions schedule(const std::string& dtype = "float32", const std::string& met
 /// A code between the training codes, and what it does.
 struct Hidden {
   ModelFile model = testing::readable_model();
-  std::unique_ptr<const Unknowns> unknowns = make_latent_unknowns(model);
+  std::unique_ptr<const FitVariables> variables = make_latent_variables(model);
   kernels::LawDescription law;
   Observation observation;
 
   Hidden() {
-    law = unknowns->law(unknowns->start(3));
+    law = variables->law(variables->start(3));
     law.z[0] += 0.1;
     law.z[2] -= 0.15;
     law.z[3] += 0.3;
@@ -46,9 +46,9 @@ struct Hidden {
 
 TEST(Fit, FindsTheParametersOfAnElasticBody) {
   const Observation o = testing::observe(testing::elastic_body(2e4, 3e4));
-  const auto unknowns =
-      make_analytic_unknowns(kernels::LawId::elastic, {{1e3, 1e6}, {1e3, 1e6}}, 12, 1);
-  const FitResult r = fit_observation(o, "o", *unknowns, schedule(), quiet());
+  const auto variables =
+      make_analytic_variables(kernels::LawId::elastic, {{1e3, 1e6}, {1e3, 1e6}}, 12, 1);
+  const FitResult r = fit_observation(o, "o", *variables, schedule(), quiet());
   EXPECT_NEAR(r.law.mu, 2e4, 20);
   EXPECT_NEAR(r.law.lambda, 3e4, 60);
   EXPECT_LT(r.mse, 1e-10);
@@ -58,7 +58,7 @@ TEST(Fit, FindsAKnownLatentCode) {
   const Hidden hidden;
   FitOptions options = schedule();
   options.stages.back().epochs = 40;
-  const FitResult r = fit_observation(hidden.observation, "o", *hidden.unknowns, options, quiet());
+  const FitResult r = fit_observation(hidden.observation, "o", *hidden.variables, options, quiet());
   EXPECT_LT(r.mse, 1e-9);
   EXPECT_LT(r.mse, 1e-3 * *std::min_element(r.start_mse.begin(), r.start_mse.end()));
   const std::vector<double>&found = r.law.z, &true_z = hidden.law.z;
@@ -71,7 +71,7 @@ TEST(Fit, FindsAKnownLatentCode) {
 
 TEST(Fit, AdamImprovesOnEveryStart) {
   const Hidden hidden;
-  const FitResult r = fit_observation(hidden.observation, "o", *hidden.unknowns,
+  const FitResult r = fit_observation(hidden.observation, "o", *hidden.variables,
                                       schedule("float32", "adam"), quiet());
   EXPECT_LT(r.mse, 0.3 * *std::min_element(r.start_mse.begin(), r.start_mse.end()));
 }
@@ -83,10 +83,10 @@ TEST(Fit, RefinesTheInitialVelocityTogether) {
   std::normal_distribution<double> noise(0, 3e-5);
   for (double& x : noisy.x) x += noise(random);
   FitOptions options = schedule("float64");
-  const FitResult plain = fit_observation(noisy, "o", *hidden.unknowns, options, quiet());
+  const FitResult plain = fit_observation(noisy, "o", *hidden.variables, options, quiet());
   options.refine_velocity = true;
   options.stages.back().epochs = 40;
-  const FitResult refined = fit_observation(noisy, "o", *hidden.unknowns, options, quiet());
+  const FitResult refined = fit_observation(noisy, "o", *hidden.variables, options, quiet());
   const RigidMotion truth = testing::ObservedScene{}.motion;
   EXPECT_LT(refined.mse, plain.mse);
   EXPECT_LT((refined.motion.linear - truth.linear).norm(),
@@ -100,10 +100,10 @@ TEST(Fit, OneAndTwoThreadsGiveTheSameBits) {
   const int before = omp_get_max_threads();
   omp_set_num_threads(1);
   const FitResult one =
-      fit_observation(hidden.observation, "o", *hidden.unknowns, options, quiet());
+      fit_observation(hidden.observation, "o", *hidden.variables, options, quiet());
   omp_set_num_threads(2);
   const FitResult two =
-      fit_observation(hidden.observation, "o", *hidden.unknowns, options, quiet());
+      fit_observation(hidden.observation, "o", *hidden.variables, options, quiet());
   omp_set_num_threads(before);
   EXPECT_EQ(one.u, two.u);
   EXPECT_EQ(one.mse, two.mse);
@@ -122,23 +122,23 @@ TEST_P(StoppedAfter, GoesOnToTheSameBits) {
   FitOptions options = schedule();
   options.stages.back().epochs = 5;
   const FitResult whole =
-      fit_observation(hidden.observation, "o", *hidden.unknowns, options, quiet());
+      fit_observation(hidden.observation, "o", *hidden.variables, options, quiet());
 
   const testing::Scratch scratch;
   FitHooks hooks = quiet();
   hooks.state_file = scratch.file("state.h5");
-  hooks.fingerprint = fit_fingerprint(hidden.observation, *hidden.unknowns, "");
+  hooks.fingerprint = fit_fingerprint(hidden.observation, *hidden.variables, "");
   hooks.save_seconds = 0;
   struct Stop {};
   int records = 0;
   hooks.on_record = [&](const FitRecord&) {
     if (++records == GetParam()) throw Stop();
   };
-  EXPECT_THROW(fit_observation(hidden.observation, "o", *hidden.unknowns, options, hooks), Stop);
+  EXPECT_THROW(fit_observation(hidden.observation, "o", *hidden.variables, options, hooks), Stop);
   int more = 0;
   hooks.on_record = [&](const FitRecord&) { ++more; };
   const FitResult resumed =
-      fit_observation(hidden.observation, "o", *hidden.unknowns, options, hooks);
+      fit_observation(hidden.observation, "o", *hidden.variables, options, hooks);
   EXPECT_LT(more, static_cast<int>(whole.history.size()));
   EXPECT_EQ(resumed.u, whole.u);
   EXPECT_EQ(resumed.mse, whole.mse);
@@ -156,8 +156,8 @@ TEST(Fit, ACandidateThatFailsIsDroppedAndTheOthersGoOn) {
   Hidden hidden;
   hidden.model.latents[0] = 6;  // a stress scale of 1e4 exp(18) Pa
   hidden.model.latents[8] = 2.5;
-  const auto unknowns = make_latent_unknowns(hidden.model);
-  const FitResult r = fit_observation(hidden.observation, "o", *unknowns, schedule(), quiet());
+  const auto variables = make_latent_variables(hidden.model);
+  const FitResult r = fit_observation(hidden.observation, "o", *variables, schedule(), quiet());
   EXPECT_TRUE(std::isinf(r.start_mse[0]));
   EXPECT_LT(r.mse, 1e-6);
   EXPECT_NE(r.start, 0);
@@ -166,30 +166,30 @@ TEST(Fit, ACandidateThatFailsIsDroppedAndTheOthersGoOn) {
 TEST(Fit, NoStartThatRunsIsAnErrorThatSaysWhy) {
   Hidden hidden;
   for (int i = 0; i < 8; ++i) hidden.model.latents[4 * i] = 6;
-  const auto unknowns = make_latent_unknowns(hidden.model);
+  const auto variables = make_latent_variables(hidden.model);
   const std::string message = testing::error_of(
-      [&] { fit_observation(hidden.observation, "seen.h5", *unknowns, schedule(), quiet()); });
+      [&] { fit_observation(hidden.observation, "seen.h5", *variables, schedule(), quiet()); });
   EXPECT_THAT(message,
               HasSubstr("seen.h5: expected that at least one of 8 starts can be simulated"));
   EXPECT_THAT(message, HasSubstr("particle"));
 }
 
 TEST(Fit, StartsCoverEveryMaterialAndKeepADistance) {
-  const auto unknowns = make_latent_unknowns(testing::readable_model(20));
+  const auto variables = make_latent_variables(testing::readable_model(20));
   std::vector<double> early(20), full(20);
   for (int i = 0; i < 20; ++i) {
     early[i] = i % 2 == 0 ? i + 1 : 100 + i;  // the elastic codes are all better at first
     full[i] = 20 - i;
   }
-  const std::vector<int> chosen = choose_starts(*unknowns, early, full, 6);
+  const std::vector<int> chosen = choose_starts(*variables, early, full, 6);
   ASSERT_EQ(chosen.size(), 6u);
   EXPECT_EQ(chosen[0], 0);   // best at the short horizon
   EXPECT_EQ(chosen[1], 19);  // best over all frames
   EXPECT_EQ(std::set<int>(chosen.begin(), chosen.end()).size(), 6u);
-  EXPECT_THAT(choose_starts(*unknowns, early, full, 100), ::testing::SizeIs(20));
+  EXPECT_THAT(choose_starts(*variables, early, full, 100), ::testing::SizeIs(20));
   for (int i = 1; i < 20; ++i) early[i] = std::numeric_limits<double>::infinity();
   full = early;
-  EXPECT_THAT(choose_starts(*unknowns, early, full, 6), ::testing::ElementsAre(0));
+  EXPECT_THAT(choose_starts(*variables, early, full, 6), ::testing::ElementsAre(0));
 }
 
 TEST(Fit, HorizonsCountFromContact) {
@@ -204,14 +204,14 @@ TEST(Fit, PicturesAndMetricsOfAResult) {
   const Hidden hidden;
   FitOptions options = schedule();
   options.stages.back().epochs = 3;
-  const Inference inference = infer(hidden.observation, "o", *hidden.unknowns, options, quiet());
+  const Inference inference = infer(hidden.observation, "o", *hidden.variables, options, quiet());
   EXPECT_NEAR(inference.fit_mse, inference.fit.mse, 1e-3 * inference.fit.mse + 1e-12);
   EXPECT_NEAR(inference.size, 0.25, 1e-9);
   Metrics metrics;
-  add_metrics(metrics, inference, hidden.observation, *hidden.unknowns);
+  add_metrics(metrics, inference, hidden.observation, *hidden.variables);
   for (const auto& [name, value] : metrics.entries()) EXPECT_TRUE(std::isfinite(value)) << name;
   EXPECT_EQ(*metrics.find("roll_outs"), static_cast<double>(inference.fit.history.size()));
-  const Chart chart = loss_chart(inference.fit, *hidden.unknowns, "loss");
+  const Chart chart = loss_chart(inference.fit, *hidden.variables, "loss");
   std::size_t points = 0;
   for (const Series& s : chart.series) points += s.x.size();
   EXPECT_EQ(chart.series.size(), 4u);

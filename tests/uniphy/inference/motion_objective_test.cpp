@@ -6,7 +6,7 @@
 
 #include "tests/support/finite_differences.hpp"
 #include "tests/uniphy/inference/observed_scene.hpp"
-#include "uniphy/inference/unknowns.hpp"
+#include "uniphy/inference/fit_variables.hpp"
 
 namespace uniphy {
 namespace {
@@ -72,16 +72,16 @@ TEST(MotionObjective, GradientOfAnalyticParametersAndOfTheVelocity) {
   }
 }
 
-TEST(MotionObjective, GradientOfTheLatentCodeThroughTheUnknowns) {
-  const auto unknowns = make_latent_unknowns(testing::readable_model());
-  const std::vector<double> truth = unknowns->start(1);
-  const Problem p(unknowns->law(truth));
+TEST(MotionObjective, GradientOfTheLatentCodeThroughTheFitVariables) {
+  const auto variables = make_latent_variables(testing::readable_model());
+  const std::vector<double> truth = variables->start(1);
+  const Problem p(variables->law(truth));
   std::vector<double> u = truth;
   for (double& x : u) x += 0.2;
-  const Evaluation e = p.objective->evaluate(unknowns->law(u), p.motion, 41);
-  const auto gradient = unknowns->gradient(u, e.parameters);
+  const Evaluation e = p.objective->evaluate(variables->law(u), p.motion, 41);
+  const auto gradient = variables->gradient(u, e.parameters);
   const auto value = [&](const std::vector<double>& w) {
-    return p.objective->evaluate(unknowns->law(w), p.motion, 41).mse;
+    return p.objective->evaluate(variables->law(w), p.motion, 41).mse;
   };
   // Steps small enough that few particles change sides of their yield surface.
   const auto expected = testing::central_differences(value, u, std::vector<double>(u.size(), 1e-6));

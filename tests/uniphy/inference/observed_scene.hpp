@@ -3,7 +3,7 @@
 #include <random>
 #include <vector>
 
-#include "ops/kernels/rollout.hpp"
+#include "ops/kernels/rollout/rollout.hpp"
 #include "uniphy/inference/rigid_motion.hpp"
 #include "uniphy/io/model_file.hpp"
 #include "uniphy/io/observation.hpp"

@@ -50,7 +50,7 @@ ModelFile example(kernels::LawForm form = kernels::LawForm::isotropic) {
 }
 
 TEST(ModelFile, ReadsBackToTheSameBitsInBothForms) {
-  for (const auto form : {kernels::LawForm::isotropic, kernels::LawForm::seed}) {
+  for (const auto form : {kernels::LawForm::isotropic, kernels::LawForm::published}) {
     const testing::Scratch scratch;
     const ModelFile written = example(form);
     write_model(scratch.file("m.h5"), written);
@@ -183,9 +183,9 @@ TEST(ModelFile, MalformedFilesAreRefused) {
             "m.h5: attribute format: expected \"uniphy-model\", found \"uniphy-dataset\"");
   EXPECT_EQ(message_of([](Layout& l) { l.version = 2; }),
             "m.h5: attribute version: expected 1, found 2");
-  EXPECT_EQ(
-      message_of([](Layout& l) { l.form = "neural"; }),
-      "m.h5: attribute form: expected a form of the law from isotropic, seed, found \"neural\"");
+  EXPECT_EQ(message_of([](Layout& l) { l.form = "neural"; }),
+            "m.h5: attribute form: expected a form of the law from isotropic, published, found "
+            "\"neural\"");
   EXPECT_EQ(message_of([](Layout& l) { l.activation = "relu"; }),
             "m.h5: attribute activation: expected an activation from gelu, silu, squareplus, found "
             "\"relu\"");

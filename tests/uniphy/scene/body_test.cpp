@@ -7,7 +7,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "uniphy/geometry/shape_catalogue.hpp"
 #include "uniphy/geometry/shapes/box.hpp"
 

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <limits>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "tests/support/random_weights.hpp"
 #include "uniphy/io/latent_file.hpp"
 #include "uniphy/io/model_file.hpp"

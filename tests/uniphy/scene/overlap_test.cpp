@@ -6,7 +6,7 @@
 #include <Eigen/Geometry>
 #include <filesystem>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "uniphy/config/config.hpp"
 #include "uniphy/geometry/fill.hpp"
 #include "uniphy/geometry/shapes/box.hpp"

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "uniphy/geometry/shape_catalogue.hpp"
 #include "uniphy/scene/simulation_run.hpp"
 

@@ -8,7 +8,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 #include "uniphy/geometry/shape_catalogue.hpp"
 
 namespace uniphy {

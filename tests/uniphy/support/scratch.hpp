@@ -7,7 +7,7 @@
 #include <fstream>
 #include <string>
 
-#include "ops/kernels/error.hpp"
+#include "ops/kernels/base/error.hpp"
 
 namespace uniphy::testing {
 

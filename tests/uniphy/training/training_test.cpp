@@ -9,8 +9,8 @@
 #include <fstream>
 #include <random>
 
-#include "ops/kernels/error.hpp"
-#include "ops/kernels/law.hpp"
+#include "ops/kernels/base/error.hpp"
+#include "ops/kernels/laws/law.hpp"
 #include "uniphy/io/atomic_file.hpp"
 #include "uniphy/report/plot.hpp"
 #include "uniphy/training/law_error.hpp"
@@ -103,7 +103,7 @@ bool same(const TrainingResult& a, const TrainingResult& b) {
 /// absolute again, against the kernels' own answers.
 TEST_F(TrainingTest, ObjectiveIsTheKernelsError) {
   const Dataset data = small_data(40, 3);
-  for (const kernels::LawForm form : {kernels::LawForm::isotropic, kernels::LawForm::seed}) {
+  for (const kernels::LawForm form : {kernels::LawForm::isotropic, kernels::LawForm::published}) {
     torch::Generator generator = torch::make_generator<at::CPUGeneratorImpl>(5);
     NetworkOptions options = small_options(form).network;
     const Networks networks = Networks::random(options, generator);
@@ -144,13 +144,13 @@ TEST_F(TrainingTest, ObjectiveIsTheKernelsError) {
 
 TEST_F(TrainingTest, LearnsBothForms) {
   const Dataset data = small_data(200, 1);
-  for (const kernels::LawForm form : {kernels::LawForm::isotropic, kernels::LawForm::seed}) {
+  for (const kernels::LawForm form : {kernels::LawForm::isotropic, kernels::LawForm::published}) {
     TrainingOptions o = small_options(form);
     o.steps = 400;
     o.learning_rate = 1e-2;
     const TrainingResult result =
         train(data, o, directory_ / (std::string(kernels::form_name(form)) + ".pt"));
-    // The seed form learns far more slowly; it must only be seen to learn.
+    // the published form learns far more slowly; it must only be seen to learn.
     const bool isotropic = form == kernels::LawForm::isotropic;
     EXPECT_LT(result.history.back().loss, (isotropic ? 0.5 : 0.9) * result.history.front().loss);
     EXPECT_LT(result.history.back().stress_error, isotropic ? 0.1 : 0.9);

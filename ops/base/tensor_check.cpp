@@ -1,0 +1,56 @@
+#include "ops/base/tensor_check.hpp"
+
+#include <torch/torch.h>
+
+#include <sstream>
+
+#include "ops/kernels/base/error.hpp"
+
+namespace uniphy::ops {
+
+using torch::Tensor;
+
+std::string describe(const Tensor& t) {
+  if (!t.defined()) return "an undefined tensor";
+  std::ostringstream s;
+  s << t.sizes() << " " << t.scalar_type() << " on " << t.device();
+  return s.str();
+}
+
+void check_tensor(const char* op, const char* name, const Tensor& t, torch::ScalarType dtype,
+                  const std::vector<std::int64_t>& sizes) {
+  bool fits = t.defined() && t.device().is_cpu() && t.scalar_type() == dtype &&
+              t.dim() == static_cast<std::int64_t>(sizes.size());
+  for (std::size_t i = 0; fits && i < sizes.size(); ++i) {
+    fits = sizes[i] == kAnySize || t.size(static_cast<std::int64_t>(i)) == sizes[i];
+  }
+  if (fits) return;
+  std::ostringstream s;
+  s << op << ": " << name << ": expected [";
+  for (std::size_t i = 0; i < sizes.size(); ++i) {
+    if (i > 0) s << ", ";
+    if (sizes[i] == kAnySize) {
+      s << "any";
+    } else {
+      s << sizes[i];
+    }
+  }
+  s << "] " << dtype << " on cpu, found " << describe(t);
+  throw Error(s.str());
+}
+
+Tensor checked(const char* op, const char* name, const Tensor& t, torch::ScalarType dtype,
+               const std::vector<std::int64_t>& sizes) {
+  check_tensor(op, name, t, dtype, sizes);
+  return t.contiguous();
+}
+
+torch::ScalarType real_type(const char* op, const char* name, const Tensor& t) {
+  if (t.defined() && (t.scalar_type() == torch::kFloat32 || t.scalar_type() == torch::kFloat64)) {
+    return t.scalar_type();
+  }
+  throw Error(std::string(op) + ": " + name + ": expected a Float or Double tensor, found " +
+              describe(t));
+}
+
+}  // namespace uniphy::ops

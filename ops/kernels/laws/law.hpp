@@ -1,0 +1,81 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "ops/kernels/learned/learned_law_weights.hpp"
+#include "ops/kernels/simd/view.hpp"
+
+namespace uniphy::kernels {
+
+/// Particles are handed to a law in chunks of at most this many, whatever the thread count, so that
+/// every sum over particles has one order.
+inline constexpr std::ptrdiff_t kLawChunk = 64;
+
+/// A constitutive law: the projection G of the trial deformation gradient and the Kirchhoff stress
+/// τ of the projected one. Simulation, inference and export see nothing else. Stateless and safe to
+/// call from several threads.
+template <class T>
+class LawKernel {
+ public:
+  virtual ~LawKernel() = default;
+
+  /// Numbers that the law is conditioned on and can be differentiated by: the material parameters
+  /// of an analytic law (in the order of parameter_names(LawId)), the latent z of a learned one.
+  virtual std::ptrdiff_t parameter_size() const = 0;
+  /// Length of the running sum that adjoint() adds to.
+  virtual std::ptrdiff_t accumulator_size() const = 0;
+  /// Turns a summed accumulator into dL/d(parameters); `gradient` has parameter_size() numbers.
+  virtual void parameter_gradient(const T* accumulator, T* gradient) const = 0;
+
+  /// F_trial, C [count, 9] → F_proj, tau [count, 9]; dt in s, C in 1/s, tau in Pa. F_proj may be
+  /// the same memory as F_trial.
+  virtual void evaluate(std::ptrdiff_t count, T dt, View<const T> F_trial, View<const T> C,
+                        View<T> F_proj, View<T> tau) const = 0;
+
+  /// The adjoint of evaluate: given dL/dF_proj and dL/dtau, overwrites grad_F_trial, adds to grad_C
+  /// and to accumulator (both may be null). grad_F_trial may be the same memory as grad_F_proj.
+  virtual void adjoint(std::ptrdiff_t count, T dt, View<const T> F_trial, View<const T> C,
+                       View<const T> grad_F_proj, View<const T> grad_tau, View<T> grad_F_trial,
+                       View<T> grad_C, T* accumulator) const = 0;
+};
+
+enum class LawId {
+  elastic,          ///< neo-Hookean
+  newtonian,        ///< weakly compressible viscous fluid
+  plasticine,       ///< von Mises return mapping, StVK-Hencky stress
+  sand,             ///< Drucker–Prager return mapping, StVK-Hencky stress
+  non_newtonian,    ///< viscoplastic return mapping, StVK-Hencky stress
+  fixed_corotated,  ///< τ = 2μ(F−R)Fᵀ + λJ(J−1)I
+  water,            ///< inviscid: τ = λJ(J−1)I, G(F) = J^{1/3} I
+  learned           ///< a trained model with a latent code
+};
+
+/// Everything that names one material. Parameters that the law does not have stay 0.
+struct LawDescription {
+  LawId id = LawId::elastic;
+  double mu = 0;                                     ///< Pa (Pa s for newtonian)
+  double lambda = 0;                                 ///< Pa
+  double tau_y = 0;                                  ///< Pa
+  double theta = 0;                                  ///< friction angle, rad
+  double eta = 0;                                    ///< Pa s
+  std::shared_ptr<const LearnedLawWeights> weights;  ///< learned only
+  std::vector<double> z;                             ///< learned only, latent_size numbers
+};
+
+/// The name of a law in YAML and HDF5 ("elastic", ...). law_id throws Error listing the known
+/// names.
+const char* law_name(LawId id);
+LawId law_id(const std::string& name);
+/// The parameters that a law takes, in the order of its gradient: subset of
+/// {"mu", "lambda", "tau_y", "theta", "eta"}; empty for learned.
+const std::vector<std::string>& parameter_names(LawId id);
+
+/// The kernel of a law on the best instruction set of this CPU. Throws Error naming the parameter
+/// where one is missing, not finite or not positive, or where z has the wrong length.
+template <class T>
+std::shared_ptr<const LawKernel<T>> make_law(const LawDescription& description);
+
+}  // namespace uniphy::kernels

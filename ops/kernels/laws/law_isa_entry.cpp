@@ -1,0 +1,40 @@
+// Compiled once for each instruction set. Nothing here may be a symbol that another translation
+// unit can define as well: all code sits in the inline namespace of the instruction set.
+
+#include "ops/kernels/laws/direct_law.hpp"
+#include "ops/kernels/laws/drucker_prager.hpp"
+#include "ops/kernels/laws/fixed_corotated.hpp"
+#include "ops/kernels/laws/law_batch.hpp"
+#include "ops/kernels/laws/neo_hookean.hpp"
+#include "ops/kernels/laws/newtonian.hpp"
+#include "ops/kernels/laws/plastic_law.hpp"
+#include "ops/kernels/laws/viscoplastic.hpp"
+#include "ops/kernels/laws/von_mises.hpp"
+#include "ops/kernels/laws/water.hpp"
+
+namespace uniphy::kernels {
+inline namespace UNIPHY_ISA {
+namespace {
+
+template <class T>
+constexpr LawTable<T> make_table() {
+  return {svd3_batch<T>,
+          svd3_adjoint_batch<T>,
+          // In the order of LawId.
+          {law_entries<DirectLaw<IdentityProjection, NeoHookean>, T>(),
+           law_entries<DirectLaw<VolumetricProjection, Newtonian>, T>(),
+           law_entries<PlasticLaw<VonMises>, T>(), law_entries<PlasticLaw<DruckerPrager>, T>(),
+           law_entries<PlasticLaw<Viscoplastic>, T>(),
+           law_entries<DirectLaw<IdentityProjection, FixedCorotated>, T>(),
+           law_entries<DirectLaw<VolumetricProjection, Water>, T>()}};
+}
+
+}  // namespace
+
+extern const LawTable<float> law_table_float;
+extern const LawTable<double> law_table_double;
+constexpr LawTable<float> law_table_float = make_table<float>();
+constexpr LawTable<double> law_table_double = make_table<double>();
+
+}  // namespace UNIPHY_ISA
+}  // namespace uniphy::kernels

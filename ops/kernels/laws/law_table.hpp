@@ -1,0 +1,65 @@
+#pragma once
+
+#include <cstddef>
+
+#include "ops/kernels/simd/isa.hpp"
+#include "ops/kernels/simd/view.hpp"
+
+namespace uniphy::kernels {
+
+/// The parameters of an analytic law and, at the same places, the gradient with respect to them.
+/// Units: mu, lambda, tau_y in Pa (mu of newtonian and eta in Pa s), theta in rad.
+template <class T>
+struct LawParameters {
+  T mu = 0, lambda = 0, tau_y = 0, theta = 0, eta = 0;
+};
+inline constexpr int kLawParameters = 5;
+
+/// The number of analytic laws: LawId before `learned`.
+inline constexpr int kAnalyticLaws = 7;
+
+/// Entry points of the code compiled for one instruction set. Plain function pointers over views,
+/// one thread, any count; absent views (null data) read as zero and are not written. Matrices are
+/// nine numbers, row-major. In and out may be the same memory where the layout agrees.
+template <class T>
+struct LawTable {
+  using In = View<const T>;
+  using Out = View<T>;
+  using Parameters = LawParameters<T>;
+
+  struct Law {
+    /// F → F_proj
+    void (*project)(std::ptrdiff_t count, const Parameters&, T dt, In F, Out F_proj);
+    /// dL/dF_proj → dL/dF (overwritten); parameters accumulate into *grad unless it is null.
+    void (*project_adjoint)(std::ptrdiff_t count, const Parameters&, T dt, In F, In grad_F_proj,
+                            Out grad_F, Parameters* grad);
+    /// F, C → tau
+    void (*stress)(std::ptrdiff_t count, const Parameters&, In F, In C, Out tau);
+    /// dL/dtau → dL/dF (overwritten), dL/dC (added).
+    void (*stress_adjoint)(std::ptrdiff_t count, const Parameters&, In F, In C, In grad_tau,
+                           Out grad_F, Out grad_C, Parameters* grad);
+    /// Both in one pass over the particles, with at most one SVD each.
+    void (*evaluate)(std::ptrdiff_t count, const Parameters&, T dt, In F, In C, Out F_proj,
+                     Out tau);
+    void (*adjoint)(std::ptrdiff_t count, const Parameters&, T dt, In F, In C, In grad_F_proj,
+                    In grad_tau, Out grad_F, Out grad_C, Parameters* grad);
+  };
+
+  /// F → U, sigma (three numbers), Vᵀ
+  void (*svd3)(std::ptrdiff_t count, In F, Out U, Out sigma, Out Vh);
+  void (*svd3_adjoint)(std::ptrdiff_t count, In U, In sigma, In Vh, In grad_U, In grad_sigma,
+                       In grad_Vh, Out grad_F);
+  Law laws[kAnalyticLaws];  ///< indexed by LawId
+};
+
+/// The table of an available instruction set. Throws Error where this build or CPU lacks it.
+template <class T>
+const LawTable<T>& law_table(Isa isa);
+
+/// The table in use.
+template <class T>
+const LawTable<T>& law_table() {
+  return law_table<T>(active_isa());
+}
+
+}  // namespace uniphy::kernels

@@ -1,0 +1,8 @@
+#include "ops/kernels/learned/learned_law_isa_entry.hpp"
+
+namespace uniphy::kernels {
+inline namespace UNIPHY_ISA {
+template const LearnedLawTable<float>& learned_law_isa_table<float>();
+template const LearnedLawTable<double>& learned_law_isa_table<double>();
+}  // namespace UNIPHY_ISA
+}  // namespace uniphy::kernels

@@ -1,0 +1,244 @@
+#pragma once
+
+#include "ops/kernels/learned/learned_law_table.hpp"
+#include "ops/kernels/mlp/mlp.hpp"
+#include "ops/kernels/spectral/spectral.hpp"
+
+// the published form of the learned law, as published (UniPhy, supplementary, Algorithms 1 and 2):
+//   projection  Δ = g_φ(F, U, Σ, Vᵀ, z),  F_proj = F + Δ
+//   stress      S₁ = f_θ(Σ, FᵀF, J, log J, F_max, log F_max, RᵀCR t₀, z) of the projected F,
+//               F_max = max(F₀₀, 1e-6),  R = U Vᵀ,  τ = s R ½(S₁ + S₁ᵀ) Rᵀ
+// with J clamped at 1e-6 in the logarithm. It is kept as the reference: the factors U and V are not
+// unique at equal singular values, so it is discontinuous there and its gradient is regularised
+// (svd3_adjoint). The stress scale s and the time unit t₀ are the only additions; one network could
+// not span 1e1 … 1e6 Pa without them.
+
+namespace uniphy::kernels {
+inline namespace UNIPHY_ISA {
+
+template <class T>
+std::ptrdiff_t published_scratch(const LearnedLaw<T>& law) {
+  return law.projection.tape_scratch() + law.stress.tape_scratch() + kTile * 136;
+}
+
+template <class T>
+struct SeedTile {
+  T *projection_in, *stress_in, *grad_projection, *grad_stress, *grad_features;
+  T* rotations;  ///< U and V of the projected F; its Σ is in stress_in
+  T *tape, *stress_tape;
+  SeedTile(const LearnedLaw<T>& law, T* scratch) {
+    projection_in = scratch;
+    stress_in = projection_in + 32 * kTile;
+    grad_features = stress_in + 28 * kTile;
+    grad_projection = grad_features + 32 * kTile;
+    grad_stress = grad_projection + 12 * kTile;
+    rotations = grad_stress + 12 * kTile;
+    tape = rotations + 18 * kTile;
+    stress_tape = tape + law.projection.tape_scratch();
+  }
+};
+
+namespace seed_detail {
+
+template <class V, class T>
+UNIPHY_INLINE void put(T* planes, int row, std::ptrdiff_t l, const V& value) {
+  value.store_aligned(planes + row * kTile + l);
+}
+template <class V, class T>
+UNIPHY_INLINE void put3(T* planes, int row, std::ptrdiff_t l, const Mat3<V>& m) {
+  for (int k = 0; k < 9; ++k) put(planes, row + k, l, m.e[k]);
+}
+template <class V, class T>
+UNIPHY_INLINE Mat3<V> get3(const T* planes, int row, std::ptrdiff_t l) {
+  Mat3<V> m;
+  for (int k = 0; k < 9; ++k) m.e[k] = V::load_aligned(planes + (row + k) * kTile + l);
+  return m;
+}
+
+/// The decompositions that seed_tile_forward has left: of F from projection_in, of the projected F.
+template <class V, class T>
+UNIPHY_INLINE Svd3<V> trial_svd(const SeedTile<T>& tile, std::ptrdiff_t l) {
+  Svd3<V> s;
+  s.U = get3<V>(tile.projection_in, 9, l);
+  for (int i = 0; i < 3; ++i)
+    s.sigma[i] = V::load_aligned(tile.projection_in + (18 + i) * kTile + l);
+  s.V_ = transpose(get3<V>(tile.projection_in, 21, l));
+  return s;
+}
+template <class V, class T>
+UNIPHY_INLINE Svd3<V> projected_svd(const SeedTile<T>& tile, std::ptrdiff_t l) {
+  Svd3<V> s;
+  s.U = get3<V>(tile.rotations, 0, l);
+  for (int i = 0; i < 3; ++i) s.sigma[i] = V::load_aligned(tile.stress_in + i * kTile + l);
+  s.V_ = get3<V>(tile.rotations, 9, l);
+  return s;
+}
+template <class V, class T>
+UNIPHY_INLINE Mat3<V> projected_rotation(const SeedTile<T>& tile, std::ptrdiff_t l) {
+  return mult(get3<V>(tile.rotations, 0, l), get3<V>(tile.rotations, 9, l));
+}
+
+/// What the stress of one vector of particles is made of.
+template <class V>
+struct StressInputs {
+  Mat3<V> R, right;  ///< right = FᵀF
+  V J, J_safe, F_max;
+};
+template <class V>
+UNIPHY_INLINE StressInputs<V> stress_inputs(const Mat3<V>& F, const Svd3<V>& svd) {
+  const V floor(ScalarOf<V>(1e-6));
+  StressInputs<V> s;
+  s.R = mult(svd.U, svd.V_);
+  s.right = tmul(F, F);
+  s.J = determinant(F);
+  s.J_safe = lane_max(s.J, floor);
+  s.F_max = lane_max(F(0, 0), floor);
+  return s;
+}
+
+}  // namespace seed_detail
+
+/// Runs both networks on one tile; returns Δ and S₁ as planes.
+template <bool keep, class T>
+inline void seed_tile_forward(const LearnedLaw<T>& law, std::ptrdiff_t count, View<const T> F_trial,
+                              View<const T> C, const SeedTile<T>& tile, const T*& delta,
+                              const T*& S1) {
+  using V = Lanes<T>;
+  using namespace seed_detail;
+  constexpr int w = width_of<V>;
+  for (std::ptrdiff_t pair = 0; pair < kTile; pair += 2 * w) {
+    const Mat3<V> F[2] = {load_mat3<V, T>(F_trial, pair, count - pair, true),
+                          load_mat3<V, T>(F_trial, pair + w, count - pair - w, true)};
+    Svd3<V> svd[2];
+    svd3(F, svd);
+    for (int half = 0; half < 2; ++half) {
+      const std::ptrdiff_t l = pair + half * w;
+      put3(tile.projection_in, 0, l, F[half]);
+      put3(tile.projection_in, 9, l, svd[half].U);
+      for (int i = 0; i < 3; ++i) put(tile.projection_in, 18 + i, l, svd[half].sigma[i]);
+      put3(tile.projection_in, 21, l, transpose(svd[half].V_));
+    }
+  }
+  delta = keep ? mlp_forward_tape(law.projection, tile.projection_in, tile.tape)
+               : mlp_forward(law.projection, tile.projection_in, tile.tape);
+  for (std::ptrdiff_t pair = 0; pair < kTile; pair += 2 * w) {
+    Mat3<V> F[2];
+    Svd3<V> svd[2];
+    for (int half = 0; half < 2; ++half) {
+      const std::ptrdiff_t l = pair + half * w;
+      F[half] = get3<V>(tile.projection_in, 0, l) + get3<V>(delta, 0, l);
+    }
+    svd3(F, svd);
+    for (int half = 0; half < 2; ++half) {
+      const std::ptrdiff_t l = pair + half * w;
+      const StressInputs<V> s = stress_inputs(F[half], svd[half]);
+      put3(tile.rotations, 0, l, svd[half].U);
+      put3(tile.rotations, 9, l, svd[half].V_);
+      for (int i = 0; i < 3; ++i) put(tile.stress_in, i, l, svd[half].sigma[i]);
+      put3(tile.stress_in, 3, l, s.right);
+      put(tile.stress_in, 12, l, s.J);
+      put(tile.stress_in, 13, l, lane_log(s.J_safe));
+      put(tile.stress_in, 14, l, s.F_max);
+      put(tile.stress_in, 15, l, lane_log(s.F_max));
+      const Mat3<V> rate = load_mat3<V, T>(C, l, count - l, false);
+      put3(tile.stress_in, 16, l, tmul(s.R, mul(rate, s.R)) * V(T(kTimeScale)));
+    }
+  }
+  S1 = keep ? mlp_forward_tape(law.stress, tile.stress_in, tile.stress_tape)
+            : mlp_forward(law.stress, tile.stress_in, tile.stress_tape);
+}
+
+/// F_trial, C → F_proj, tau for count ≤ kTile particles.
+template <class T>
+inline void published_evaluate(const LearnedLaw<T>& law, std::ptrdiff_t count,
+                               View<const T> F_trial, View<const T> C, View<T> F_proj, View<T> tau,
+                               T* scratch) {
+  using V = Lanes<T>;
+  using namespace seed_detail;
+  const SeedTile<T> tile(law, scratch);
+  const T *delta, *S1;
+  seed_tile_forward<false>(law, count, F_trial, C, tile, delta, S1);
+  for (std::ptrdiff_t l = 0; l < count; l += width_of<V>) {
+    const Mat3<V> F = get3<V>(tile.projection_in, 0, l) + get3<V>(delta, 0, l);
+    if (F_proj) store_mat3<V, T>(F_proj, l, count - l, F);
+    if (!tau) continue;
+    const Mat3<V> R = projected_rotation<V>(tile, l);
+    store_mat3<V, T>(tau, l, count - l,
+                     mult(mul(R, sym(get3<V>(S1, 0, l))), R) * V(law.stress_scale));
+  }
+}
+
+/// The adjoint of published_evaluate, recomputing its forward pass tile by tile. Overwrites
+/// grad_F_trial, adds to grad_C and accumulator (both may be null).
+template <class T>
+inline void published_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, View<const T> F_trial,
+                              View<const T> C, View<const T> grad_F_proj, View<const T> grad_tau,
+                              View<T> grad_F_trial, View<T> grad_C, T* accumulator, T* scratch) {
+  using V = Lanes<T>;
+  using namespace seed_detail;
+  constexpr int w = width_of<V>;
+  const SeedTile<T> tile(law, scratch);
+  const T *delta, *S1;
+  seed_tile_forward<true>(law, count, F_trial, C, tile, delta, S1);
+  const V scale(law.stress_scale), zero(T(0)), one(T(1)), floor(T(1e-6)), t0 = V(T(kTimeScale));
+  V sum_log_s = zero;
+  for (std::ptrdiff_t l = 0; l < kTile; l += w) {
+    const Mat3<V> R = projected_rotation<V>(tile, l);
+    const Mat3<V> gt = sym(load_mat3<V, T>(grad_tau, l, count - l, false)) * scale;
+    const Mat3<V> gS = tmul(R, mul(gt, R));
+    put3(tile.grad_stress, 0, l, gS);
+    sum_log_s = sum_log_s + dot(gS, sym(get3<V>(S1, 0, l)));
+  }
+  mlp_backward<T>(law.stress, tile.stress_in, tile.stress_tape, tile.grad_stress,
+                  tile.grad_features,
+                  accumulator ? accumulator + law.projection.layer[0].out : nullptr, nullptr);
+  for (std::ptrdiff_t l = 0; l < kTile; l += w) {
+    const Mat3<V> F = get3<V>(tile.projection_in, 0, l) + get3<V>(delta, 0, l);
+    const Svd3<V> svd = projected_svd<V>(tile, l);
+    const StressInputs<V> s = stress_inputs(F, svd);
+    const Mat3<V> rate = load_mat3<V, T>(C, l, count - l, false);
+    const Mat3<V> gt = sym(load_mat3<V, T>(grad_tau, l, count - l, false)) * scale;
+    const auto feature = [&](int k) { return V::load_aligned(tile.grad_features + k * kTile + l); };
+    const Mat3<V> g_right = get3<V>(tile.grad_features, 3, l);
+    const Mat3<V> g_rate = get3<V>(tile.grad_features, 16, l) * t0;
+
+    // τ = R Ŝ Rᵀ and Ĉ = Rᵀ C R, both through R.
+    Mat3<V> gR = mul(gt, mul(s.R, sym(get3<V>(S1, 0, l)))) * V(T(2));
+    gR = gR + mul(rate, mult(s.R, g_rate)) + tmul(rate, mul(s.R, g_rate));
+    const Mat3<V> P = tmul(svd.U, mul(gR, svd.V_));
+    Mat3<V> A = zero3<V>();
+    for (int i = 0; i < 3; ++i) A(i, i) = feature(i);
+    for (int k = 0; k < 3; ++k) {
+      const int i = kPair[k][0], j = kPair[k][1];
+      // R = U 1 Vᵀ: the divided difference is 0, the divided sum 2/(σi + σj).
+      const V a = (P(i, j) - P(j, i)) * inverse_sum(svd.sigma[i], svd.sigma[j]);
+      A(i, j) = a;
+      A(j, i) = -a;
+    }
+    Mat3<V> gF = mult(mul(svd.U, A), svd.V_);
+    gF = gF + mul(F, g_right + transpose(g_right));
+    const V g_J = feature(12) + select<V>(s.J > floor, feature(13) / s.J_safe, zero);
+    gF = gF + cofactor(F) * g_J;
+    gF(0, 0) = gF(0, 0) + select<V>(F(0, 0) > floor, feature(14) + feature(15) / s.F_max, zero);
+    gF = gF + load_mat3<V, T>(grad_F_proj, l, count - l, false);
+    put3(tile.grad_projection, 0, l, gF);
+    if (grad_C && l < count)
+      store_mat3<V, T>(grad_C, l, count - l, mult(mul(s.R, g_rate), s.R), true);
+  }
+  mlp_backward<T>(law.projection, tile.projection_in, tile.tape, tile.grad_projection,
+                  tile.grad_features, accumulator, nullptr);
+  for (std::ptrdiff_t l = 0; l < count; l += w) {
+    Vec3<V> g_sigma;
+    for (int i = 0; i < 3; ++i)
+      g_sigma[i] = V::load_aligned(tile.grad_features + (18 + i) * kTile + l);
+    const Mat3<V> g = svd3_adjoint(trial_svd<V>(tile, l), get3<V>(tile.grad_features, 9, l),
+                                   g_sigma, transpose(get3<V>(tile.grad_features, 21, l))) +
+                      get3<V>(tile.grad_features, 0, l) + get3<V>(tile.grad_projection, 0, l);
+    if (grad_F_trial) store_mat3<V, T>(grad_F_trial, l, count - l, g);
+  }
+  if (accumulator)
+    accumulator[law.projection.layer[0].out + law.stress.layer[0].out] += lane_sum(sum_log_s);
+}
+
+}  // namespace UNIPHY_ISA
+}  // namespace uniphy::kernels

@@ -1,0 +1,199 @@
+#include "ops/kernels/rollout/rollout.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "ops/kernels/base/between_steps.hpp"
+#include "ops/kernels/base/check_positive.hpp"
+#include "ops/kernels/base/error.hpp"
+#include "ops/kernels/rollout/rollout_engine.hpp"
+
+namespace uniphy::kernels {
+namespace {
+
+/// Particles are sorted by cell again after this many steps. The order of summation, hence the
+/// bits, depends on it, so it must not depend on where frames are taken.
+constexpr std::ptrdiff_t kSortEvery = 32;
+
+template <class T>
+void check_size(const char* name, const std::vector<T>& values, std::ptrdiff_t expected) {
+  if (static_cast<std::ptrdiff_t>(values.size()) == expected) return;
+  throw Error(std::string("roll-out: expected ") + std::to_string(expected) + " numbers in " +
+              name + ", found " + std::to_string(values.size()));
+}
+
+template <class T>
+void check_state(const ParticleState<T>& state, std::ptrdiff_t particles) {
+  check_size("x", state.x, 3 * particles);
+  check_size("v", state.v, 3 * particles);
+  check_size("C", state.C, 9 * particles);
+  check_size("F", state.F, 9 * particles);
+}
+
+void check_steps(std::ptrdiff_t steps, std::ptrdiff_t every, std::ptrdiff_t least_every) {
+  if (steps < 0) throw Error("roll-out: expected steps >= 0, found " + std::to_string(steps));
+  if (every < least_every) {
+    throw Error("roll-out: expected every >= " + std::to_string(least_every) + ", found " +
+                std::to_string(every));
+  }
+}
+
+}  // namespace
+
+template <class T>
+ParticleState<T> ParticleState<T>::undeformed(std::vector<T> x, std::vector<T> v) {
+  ParticleState state;
+  state.C.assign(3 * x.size(), T(0));
+  state.F.assign(3 * x.size(), T(0));
+  for (std::size_t k = 0; k < state.F.size(); k += 9) {
+    state.F[k] = state.F[k + 4] = state.F[k + 8] = 1;
+  }
+  state.x = std::move(x);
+  state.v = std::move(v);
+  return state;
+}
+
+template <class T>
+Rollout<T>::Rollout(const GridSettings& grid, std::vector<BodyRange<T>> bodies, std::vector<T> mass,
+                    std::vector<T> volume)
+    : grid_(grid), bodies_(std::move(bodies)), mass_(std::move(mass)), volume_(std::move(volume)) {
+  grid_.check();
+  for (std::size_t b = 0; b < bodies_.size(); ++b) {
+    if (bodies_[b].law == nullptr) throw Error("body " + std::to_string(b) + " has no law");
+  }
+  const std::ptrdiff_t expected = bodies_.empty() ? 0 : bodies_.back().end;
+  check_size("mass", mass_, expected);
+  check_size("volume", volume_, expected);
+  check_positive("roll-out", "mass", mass_.data(), expected);
+  check_positive("roll-out", "volume", volume_.data(), expected);
+  std::vector<ParticleRange> ranges;
+  for (const auto& body : bodies_) ranges.emplace_back(body.begin, body.end);
+  ParticleOrder{ranges};  // refuses ranges that do not fit
+}
+
+template <class T>
+std::ptrdiff_t Rollout<T>::run(ParticleState<T>& state, std::ptrdiff_t steps,
+                               const RunOptions<T>& options) const {
+  check_state(state, particles());
+  check_steps(steps, options.every, 0);
+  const bool frames = options.every > 0 && options.on_frame;
+  ParticleState<T> frame;
+  frame.x.resize(3 * particles());
+  if (options.frame_v) frame.v.resize(3 * particles());
+  if (options.frame_C) frame.C.resize(9 * particles());
+  if (options.frame_F) frame.F.resize(9 * particles());
+  const bool samples = options.sample_step && options.on_sample;
+  LawSample<T> sample;
+
+  RolloutEngine<T> engine(*this);
+  engine.load(state);
+  std::ptrdiff_t done = 0;
+  while (true) {
+    if (frames && done % options.every == 0) {
+      engine.store(frame);
+      if (!options.on_frame(options.first_step + done, frame)) break;
+    }
+    if (done == steps) break;
+    call_between_steps();
+    if (done > 0 && done % kSortEvery == 0) {
+      engine.store(state);
+      engine.load(state);
+    }
+    std::ptrdiff_t until = std::min(steps, (done / kSortEvery + 1) * kSortEvery);
+    if (frames) until = std::min(until, (done / options.every + 1) * options.every);
+    const std::ptrdiff_t step = options.first_step + done;
+    if (samples && options.sample_step(step)) {
+      engine.advance_sampled(step, sample);
+      options.on_sample(step, sample);
+      ++done;
+      continue;
+    }
+    std::ptrdiff_t next = done + 1;
+    while (next < until && !(samples && options.sample_step(options.first_step + next))) ++next;
+    engine.advance(step, next - done);
+    done = next;
+  }
+  engine.store(state);
+  return done;
+}
+
+template <class T>
+void Rollout<T>::record(const ParticleState<T>& initial, std::ptrdiff_t steps, std::ptrdiff_t every,
+                        T* frames_x, T* frames_v, RolloutTape<T>* tape) const {
+  check_state(initial, particles());
+  check_steps(steps, every, 1);
+  // Segments of about sqrt(steps), in multiples of kSortEvery: then most roll-outs have the bits of
+  // run().
+  const double root = std::sqrt(static_cast<double>(steps));
+  const std::ptrdiff_t segment =
+      kSortEvery * std::max<std::ptrdiff_t>(1, std::lround(std::ceil(root / kSortEvery)));
+  if (tape != nullptr) *tape = RolloutTape<T>{steps, every, segment, {}};
+
+  RolloutEngine<T> engine(*this);
+  ParticleState<T> state = initial, frame;
+  for (std::ptrdiff_t done = 0;;) {
+    if (done % segment == 0) {
+      if (done > 0) engine.store(state);
+      engine.load(state);
+      if (tape != nullptr && done < steps) tape->checkpoints.push_back(state);
+    }
+    if (done % every == 0) {
+      frame.x.resize(3 * particles());
+      if (frames_v != nullptr) frame.v.resize(3 * particles());
+      engine.store(frame);
+      const std::ptrdiff_t at = done / every * 3 * particles();
+      std::copy(frame.x.begin(), frame.x.end(), frames_x + at);
+      if (frames_v != nullptr) std::copy(frame.v.begin(), frame.v.end(), frames_v + at);
+    }
+    if (done == steps) break;
+    call_between_steps();
+    const std::ptrdiff_t until =
+        std::min({steps, (done / segment + 1) * segment, (done / every + 1) * every});
+    engine.advance(done, until - done);
+    done = until;
+  }
+}
+
+template <class T>
+RolloutGradient<T> Rollout<T>::adjoint(const RolloutTape<T>& tape, const T* grad_x,
+                                       const T* grad_v) const {
+  RolloutGradient<T> result;
+  ParticleState<T>& grad = result.state;
+  grad.x.assign(3 * particles(), T(0));
+  grad.v.assign(3 * particles(), T(0));
+  grad.C.assign(9 * particles(), T(0));
+  grad.F.assign(9 * particles(), T(0));
+  if (tape.steps % tape.every == 0) {
+    const std::ptrdiff_t at = tape.steps / tape.every * 3 * particles();
+    if (grad_x != nullptr) std::copy_n(grad_x + at, 3 * particles(), grad.x.begin());
+    if (grad_v != nullptr) std::copy_n(grad_v + at, 3 * particles(), grad.v.begin());
+  }
+
+  RolloutEngine<T> engine(*this);
+  const typename RolloutEngine<T>::FrameGradients frames{grad_x, grad_v, tape.every};
+  for (std::ptrdiff_t k = static_cast<std::ptrdiff_t>(tape.checkpoints.size()) - 1; k >= 0; --k) {
+    call_between_steps();
+    const std::ptrdiff_t first = k * tape.segment;
+    const std::ptrdiff_t steps = std::min(tape.segment, tape.steps - first);
+    engine.load(tape.checkpoints[k], steps);
+    engine.advance(first, steps);
+    engine.backward(grad, first, frames);
+  }
+  for (std::size_t b = 0; b < bodies_.size(); ++b) {
+    const std::vector<double>& sum = engine.accumulator(static_cast<int>(b));
+    const LawKernel<T>& law = *bodies_[b].law;
+    std::vector<T> accumulator(sum.begin(), sum.end());
+    accumulator.resize(law.accumulator_size(), T(0));
+    result.parameters.emplace_back(law.parameter_size(), T(0));
+    law.parameter_gradient(accumulator.data(), result.parameters.back().data());
+  }
+  return result;
+}
+
+template struct ParticleState<float>;
+template struct ParticleState<double>;
+template class Rollout<float>;
+template class Rollout<double>;
+
+}  // namespace uniphy::kernels

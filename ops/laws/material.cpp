@@ -1,0 +1,76 @@
+#include "ops/laws/material.hpp"
+
+#include <torch/torch.h>
+
+#include <string>
+#include <utility>
+
+#include "ops/base/tensor_check.hpp"
+#include "ops/kernels/base/error.hpp"
+#include "ops/kernels/laws/analytic_law.hpp"
+
+namespace uniphy::ops {
+
+using torch::Tensor;
+
+namespace {
+
+[[noreturn]] void fail(const char* op, const char* name, const std::string& expected,
+                       const Tensor& found) {
+  throw Error(std::string(op) + ": " + name + ": expected " + expected + ", found " +
+              describe(found));
+}
+
+}  // namespace
+
+Parameter::Parameter(double value) : tensor_(torch::scalar_tensor(value, torch::kFloat64)) {}
+Parameter::Parameter(Tensor tensor) : tensor_(std::move(tensor)) {}
+
+Tensor pack_material(const char* op, kernels::LawId law, const Material& m) {
+  if (law == kernels::LawId::learned)
+    throw Error(std::string(op) + ": law: expected an analytic one, found learned");
+  const Parameter* const all[] = {&m.mu, &m.lambda, &m.tau_y, &m.theta, &m.eta};
+  const char* const names[] = {"mu", "lambda", "tau_y", "theta", "eta"};
+  std::vector<Tensor> entries;
+  for (int i = 0; i < kernels::kLawParameters; ++i) {
+    const Tensor& t = all[i]->tensor();
+    if (!t.defined() || t.numel() != 1 || !t.is_floating_point() || !t.device().is_cpu())
+      fail(op, names[i], "one Float or Double number on cpu", t);
+    entries.push_back(t.to(torch::kFloat64).reshape({}));
+  }
+  const Tensor packed = torch::stack(entries);
+  const Tensor values = packed.detach();
+  const double* v = values.data_ptr<double>();
+  kernels::LawDescription description;
+  description.id = law;
+  description.mu = v[0];
+  description.lambda = v[1];
+  description.tau_y = v[2];
+  description.theta = v[3];
+  description.eta = v[4];
+  kernels::check_parameters(description);
+  return packed;
+}
+
+template <class T>
+kernels::LawParameters<T> law_parameters(const Tensor& packed) {
+  const double* v = packed.data_ptr<double>();
+  return {T(v[0]), T(v[1]), T(v[2]), T(v[3]), T(v[4])};
+}
+template kernels::LawParameters<float> law_parameters<float>(const Tensor&);
+template kernels::LawParameters<double> law_parameters<double>(const Tensor&);
+
+void check_matrices(const char* op, const char* name, const Tensor& t) {
+  if (!t.defined() || !t.device().is_cpu() || t.dim() != 3 || t.size(1) != 3 || t.size(2) != 3 ||
+      (t.scalar_type() != torch::kFloat32 && t.scalar_type() != torch::kFloat64))
+    fail(op, name, "[P, 3, 3] Float or Double on cpu", t);
+}
+
+void check_like(const char* op, const char* name, const Tensor& t, const Tensor& F) {
+  if (t.defined() && t.device().is_cpu() && t.sizes() == F.sizes() &&
+      t.scalar_type() == F.scalar_type())
+    return;
+  fail(op, name, describe(F), t);
+}
+
+}  // namespace uniphy::ops

@@ -1,0 +1,98 @@
+#pragma once
+
+#include <torch/types.h>
+
+#include <vector>
+
+#include "ops/kernels/laws/law.hpp"
+#include "ops/kernels/laws/law_table.hpp"
+
+// What the ops of the analytic laws share: the material as tensors, and the checks of arguments.
+
+namespace uniphy::ops {
+
+/// A material parameter: a number, or a tensor of shape [] or [1] that gradients reach.
+class Parameter {
+ public:
+  Parameter() : Parameter(0.0) {}
+  Parameter(double value);          // NOLINT(google-explicit-constructor)
+  Parameter(torch::Tensor tensor);  // NOLINT(google-explicit-constructor)
+
+  const torch::Tensor& tensor() const { return tensor_; }
+
+ private:
+  torch::Tensor tensor_;
+};
+
+/// One material for all particles of a call. A law looks only at the parameters that it has
+/// (kernels::parameter_names); the gradient of the others is zero.
+struct Material {
+  Parameter mu;      ///< Pa (Pa s for newtonian)
+  Parameter lambda;  ///< Pa
+  Parameter tau_y;   ///< Pa
+  Parameter theta;   ///< rad
+  Parameter eta;     ///< Pa s
+};
+
+/// mu, lambda, tau_y, theta, eta as one float64 tensor [5]; differentiable. `op` opens the message
+/// of the Error where a tensor is not a single floating-point number on the CPU or where the law
+/// cannot have the value.
+torch::Tensor pack_material(const char* op, kernels::LawId law, const Material& material);
+
+/// The same numbers for the kernels.
+template <class T>
+kernels::LawParameters<T> law_parameters(const torch::Tensor& packed);
+
+/// Throws Error unless t is [P, 3, 3], float32 or float64, on the CPU.
+void check_matrices(const char* op, const char* name, const torch::Tensor& t);
+/// Throws Error unless t has the shape and the dtype of F.
+void check_like(const char* op, const char* name, const torch::Tensor& t, const torch::Tensor& F);
+
+/// Tensors [P, 3, 3] as views; an undefined tensor is an absent view.
+template <class T>
+kernels::View<const T> matrix_view(const torch::Tensor& t) {
+  return {t.defined() ? t.data_ptr<T>() : nullptr, 9, 1};
+}
+template <class T>
+kernels::View<T> mutable_matrix_view(const torch::Tensor& t) {
+  return {t.defined() ? t.data_ptr<T>() : nullptr, 9, 1};
+}
+
+/// Particles that one thread takes at a time: fixed, so that sums over particles have one order
+/// whatever the number of threads.
+inline constexpr std::ptrdiff_t kParticleBlock = 1024;
+
+/// body(first, count) over blocks of particles, in parallel.
+template <class Body>
+void for_each_block(std::ptrdiff_t particles, const Body& body) {
+#pragma omp parallel for schedule(static)
+  for (std::ptrdiff_t p = 0; p < particles; p += kParticleBlock) {
+    body(p, particles - p < kParticleBlock ? particles - p : kParticleBlock);
+  }
+}
+
+/// The same with a LawParameters<T>* for each block to add its share of the gradient to; their sum
+/// in order of blocks, as a tensor like `packed`. Where no gradient is wanted, the pointer is null
+/// and the result undefined.
+template <class T, class Body>
+torch::Tensor sum_over_blocks(std::ptrdiff_t particles, const torch::Tensor& packed, bool wanted,
+                              const Body& body) {
+  std::vector<kernels::LawParameters<T>> shares(
+      static_cast<std::size_t>((particles + kParticleBlock - 1) / kParticleBlock));
+  for_each_block(particles, [&](std::ptrdiff_t first, std::ptrdiff_t count) {
+    body(first, count,
+         wanted ? &shares[static_cast<std::size_t>(first / kParticleBlock)] : nullptr);
+  });
+  if (!wanted) return {};
+  double total[kernels::kLawParameters] = {};
+  for (const auto& s : shares) {
+    const double share[] = {double(s.mu), double(s.lambda), double(s.tau_y), double(s.theta),
+                            double(s.eta)};
+    for (int i = 0; i < kernels::kLawParameters; ++i) total[i] += share[i];
+  }
+  torch::Tensor sum = at::empty_like(packed);
+  for (int i = 0; i < kernels::kLawParameters; ++i) sum.data_ptr<double>()[i] = total[i];
+  return sum;
+}
+
+}  // namespace uniphy::ops

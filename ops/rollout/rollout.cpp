@@ -1,0 +1,200 @@
+#include "ops/rollout/rollout.hpp"
+
+#include <torch/torch.h>
+
+#include <string>
+
+#include "ops/base/once_differentiable.hpp"
+#include "ops/base/tensor_check.hpp"
+#include "ops/kernels/base/error.hpp"
+
+namespace uniphy::ops {
+
+using kernels::LawDescription;
+using kernels::LawId;
+using torch::Tensor;
+using torch::autograd::AutogradContext;
+using torch::autograd::variable_list;
+
+namespace {
+
+/// What forward leaves for backward. One for each call.
+template <class T>
+struct Recording : torch::CustomClassHolder {
+  explicit Recording(kernels::Rollout<T> r) : rollout(std::move(r)) {}
+  kernels::Rollout<T> rollout;
+  kernels::RolloutTape<T> tape;
+};
+
+struct Plan : torch::CustomClassHolder {
+  std::vector<RolloutBody> bodies;
+  RolloutSettings settings;
+  bool record = false;  ///< a backward pass may come
+};
+
+template <class T>
+std::vector<T> to_vector(const Tensor& t) {
+  return {t.data_ptr<T>(), t.data_ptr<T>() + t.numel()};
+}
+
+std::ptrdiff_t parameter_count(const LawDescription& law) {
+  if (law.id != LawId::learned) return std::ptrdiff_t(kernels::parameter_names(law.id).size());
+  return law.weights != nullptr ? law.weights->latent_size : std::ptrdiff_t(law.z.size());
+}
+
+std::vector<double> parameter_values(const LawDescription& law) {
+  if (law.id == LawId::learned) return law.z;
+  std::vector<double> values;
+  for (const std::string& name : kernels::parameter_names(law.id)) {
+    values.push_back(name == "mu"       ? law.mu
+                     : name == "lambda" ? law.lambda
+                     : name == "tau_y"  ? law.tau_y
+                     : name == "theta"  ? law.theta
+                                        : law.eta);
+  }
+  return values;
+}
+
+LawDescription with_parameters(LawDescription law, const double* values) {
+  if (law.id == LawId::learned) {
+    law.z.assign(values, values + parameter_count(law));
+    return law;
+  }
+  for (const std::string& name : kernels::parameter_names(law.id)) {
+    double& to = name == "mu"       ? law.mu
+                 : name == "lambda" ? law.lambda
+                 : name == "tau_y"  ? law.tau_y
+                 : name == "theta"  ? law.theta
+                                    : law.eta;
+    to = *values++;
+  }
+  return law;
+}
+
+/// All parameters of all bodies, one after the other, float64; differentiable.
+Tensor pack_parameters(const std::vector<RolloutBody>& bodies) {
+  variable_list all;
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    const std::string name = "parameters of body " + std::to_string(b);
+    const std::int64_t count = parameter_count(bodies[b].law);
+    Tensor values = bodies[b].parameters;
+    if (!values.defined()) {
+      values = torch::tensor(parameter_values(bodies[b].law), torch::kFloat64);
+    }
+    const auto type = real_type("rollout", name.c_str(), values);
+    all.push_back(checked("rollout", name.c_str(), values, type, {count}).to(torch::kFloat64));
+  }
+  if (all.empty()) throw Error("rollout: bodies: expected at least one, found none");
+  return torch::cat(all);
+}
+
+template <class T>
+kernels::Rollout<T> make_rollout(const Plan& plan, const Tensor& parameters, const Tensor& mass,
+                                 const Tensor& volume) {
+  const double* values = parameters.data_ptr<double>();
+  std::vector<kernels::BodyRange<T>> ranges;
+  for (const RolloutBody& body : plan.bodies) {
+    ranges.push_back(
+        {body.begin, body.end, kernels::make_law<T>(with_parameters(body.law, values))});
+    values += parameter_count(body.law);
+  }
+  return {plan.settings.grid, ranges, to_vector<T>(mass), to_vector<T>(volume)};
+}
+
+class RolloutFunction : public torch::autograd::Function<RolloutFunction> {
+ public:
+  static variable_list forward(AutogradContext* ctx, const Tensor& x, const Tensor& v,
+                               const Tensor& C, const Tensor& F, const Tensor& parameters,
+                               const Tensor& mass, const Tensor& volume,
+                               const c10::intrusive_ptr<Plan>& plan) {
+    const RolloutSettings& settings = plan->settings;
+    const std::int64_t frames =
+        kernels::Rollout<double>::frame_count(settings.steps, settings.every);
+    const Tensor frames_x = torch::empty({frames, x.size(0), 3}, x.options());
+    const Tensor frames_v =
+        settings.velocities ? torch::empty_like(frames_x) : torch::empty({0}, x.options());
+    for_real_type(x.scalar_type(), [&](auto real) {
+      using T = decltype(real);
+      auto recording = c10::make_intrusive<Recording<T>>(
+          make_rollout<T>(*plan, parameters.detach(), mass, volume));
+      recording->rollout.record(
+          {to_vector<T>(x), to_vector<T>(v), to_vector<T>(C), to_vector<T>(F)}, settings.steps,
+          settings.every, frames_x.template data_ptr<T>(),
+          settings.velocities ? frames_v.template data_ptr<T>() : nullptr,
+          plan->record ? &recording->tape : nullptr);
+      ctx->saved_data["recording"] = torch::IValue::make_capsule(recording);
+    });
+    ctx->saved_data["double"] = x.scalar_type() == torch::kFloat64;
+    ctx->set_materialize_grads(false);
+    return {frames_x, frames_v};
+  }
+
+  static variable_list backward(AutogradContext* ctx, variable_list grad_out) {
+    variable_list grad(8);
+    const bool is_double = ctx->saved_data["double"].toBool();
+    if (grad_out[1].defined() && grad_out[1].numel() == 0) grad_out[1] = Tensor();
+    if (!grad_out[0].defined() && !grad_out[1].defined()) return grad;
+    for_real_type(is_double ? torch::kFloat64 : torch::kFloat32, [&](auto real) {
+      using T = decltype(real);
+      const auto recording = c10::static_intrusive_pointer_cast<Recording<T>>(
+          ctx->saved_data["recording"].toCapsule());
+      const kernels::RolloutGradient<T> g = recording->rollout.adjoint(
+          recording->tape, gradient_data<T>(grad_out[0]), gradient_data<T>(grad_out[1]));
+      const std::int64_t P = recording->rollout.particles();
+      const auto type = is_double ? torch::kFloat64 : torch::kFloat32;
+      const auto put = [&](int i, const std::vector<T>& values, at::IntArrayRef sizes) {
+        if (!ctx->needs_input_grad(i)) return;
+        grad[i] = torch::empty(sizes, type);
+        std::copy(values.begin(), values.end(), grad[i].template data_ptr<T>());
+      };
+      put(0, g.state.x, {P, 3});
+      put(1, g.state.v, {P, 3});
+      put(2, g.state.C, {P, 3, 3});
+      put(3, g.state.F, {P, 3, 3});
+      if (ctx->needs_input_grad(4)) {
+        std::vector<double> all;
+        for (const auto& body : g.parameters) all.insert(all.end(), body.begin(), body.end());
+        grad[4] = torch::tensor(all, torch::kFloat64);
+      }
+    });
+    return once_differentiable("rollout", std::move(grad));
+  }
+};
+
+}  // namespace
+
+RolloutFrames rollout(const Tensor& x0, const Tensor& v0, const Tensor& C0, const Tensor& F0,
+                      const Tensor& mass, const Tensor& volume,
+                      const std::vector<RolloutBody>& bodies, const RolloutSettings& settings) {
+  const auto type = real_type("rollout", "x0", x0);
+  const Tensor x = checked("rollout", "x0", x0, type, {kAnySize, 3});
+  const std::int64_t P = x.size(0);
+  if (settings.steps < 0 || settings.every < 1) {
+    throw Error("rollout: expected steps >= 0 and every >= 1, found " +
+                std::to_string(settings.steps) + " and " + std::to_string(settings.every));
+  }
+  const Tensor C = C0.defined() ? checked("rollout", "C0", C0, type, {P, 3, 3})
+                                : torch::zeros({P, 3, 3}, x.options().requires_grad(false));
+  const Tensor F =
+      F0.defined() ? checked("rollout", "F0", F0, type, {P, 3, 3})
+                   : torch::eye(3, x.options().requires_grad(false)).expand({P, 3, 3}).contiguous();
+  const std::int64_t end = bodies.empty() ? 0 : bodies.back().end;
+  if (end != P) {
+    throw Error("rollout: bodies: expected the last one to end at particle " + std::to_string(P) +
+                ", found " + std::to_string(end));
+  }
+  auto plan = c10::make_intrusive<Plan>();
+  plan->bodies = bodies;
+  for (RolloutBody& body : plan->bodies) body.parameters = Tensor();  // `packed` carries them
+  plan->settings = settings;
+  const Tensor packed = pack_parameters(bodies);
+  const Tensor v = checked("rollout", "v0", v0, type, {P, 3});
+  const Tensor m = checked("rollout", "mass", mass, type, {P}).detach();
+  const Tensor V = checked("rollout", "volume", volume, type, {P}).detach();
+  for (const Tensor& t : {x, v, C, F, packed}) plan->record = plan->record || t.requires_grad();
+  plan->record = plan->record && torch::GradMode::is_enabled();
+  const variable_list out = RolloutFunction::apply(x, v, C, F, packed, m, V, plan);
+  return {out[0], settings.velocities ? out[1] : Tensor()};
+}
+
+}  // namespace uniphy::ops

@@ -1,0 +1,188 @@
+#include "ops/rollout/rollout.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <omp.h>
+#include <torch/torch.h>
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "ops/kernels/base/error.hpp"
+#include "ops/reference/mpm_step.hpp"
+#include "tests/support/rollout_cases.hpp"
+
+namespace uniphy::ops {
+namespace {
+
+using kernels::LawDescription;
+using kernels::LawId;
+using torch::Tensor;
+using namespace testing;
+
+class RolloutOfMaterial : public ::testing::TestWithParam<int> {};
+
+TEST_P(RolloutOfMaterial, GradientsAgreeWithCentralDifferences) {
+  const RolloutErrors errors = rollout_errors(rollout_materials()[GetParam()]);
+  EXPECT_LE(errors.velocity, 1e-6) << "v";
+  for (const double size : errors.sizes) EXPECT_NE(size, 0);
+  for (std::size_t k = 0; k < errors.parameters.size(); ++k)
+    EXPECT_LE(errors.parameters[k], 1e-6) << "parameter " << k;
+}
+INSTANTIATE_TEST_SUITE_P(, RolloutOfMaterial, ::testing::Range(0, 9),
+                         [](const auto& info) { return rollout_materials()[info.param].name; });
+
+TEST(Rollout, AgreesWithTheReferenceInValueAndGradient) {
+  RolloutScene scene;
+  scene.settings.steps = 12;
+  scene.settings.every = 4;
+  scene.settings.velocities = true;
+  torch::manual_seed(2);
+  scene.F = scene.F + 0.02 * torch::randn_like(scene.F);
+  scene.C = 3 * torch::randn_like(scene.C);
+  const LawDescription law = sample_law(LawId::elastic);
+  const Tensor p = parameters_of(law).requires_grad_();
+  const std::vector<Tensor> leaves{scene.x.requires_grad_(), scene.v.requires_grad_(),
+                                   scene.C.requires_grad_(), scene.F.requires_grad_(), p};
+  const RolloutFrames found = scene.run(law, p);
+
+  const reference::TensorLaw neo_hookean = [&](const Tensor& F, const Tensor&) {
+    const Tensor I = torch::eye(3, torch::kFloat64);
+    const Tensor log_J = torch::linalg_det(F).log().view({-1, 1, 1});
+    return std::pair{F, p[0] * torch::matmul(F, F.transpose(1, 2)) + (p[1] * log_J - p[0]) * I};
+  };
+  reference::MpmState state{scene.x, scene.v, scene.C, scene.F};
+  std::vector<Tensor> x{state.x}, v{state.v};
+  for (int step = 1; step <= 12; ++step) {
+    state = reference::mpm_step(state, scene.mass, scene.volume, neo_hookean, scene.settings.grid);
+    if (step % 4 == 0) x.push_back(state.x), v.push_back(state.v);
+  }
+  const Tensor expected_x = torch::stack(x), expected_v = torch::stack(v);
+  EXPECT_LE((found.x - expected_x).abs().max().item<double>(), 1e-13);
+  EXPECT_LE((found.v - expected_v).abs().max().item<double>(), 1e-10);
+
+  const auto both = [](const Tensor& a, const Tensor& b) { return loss_of(a) + 0.01 * loss_of(b); };
+  const auto g = torch::autograd::grad({both(found.x, found.v)}, leaves);
+  const auto e = torch::autograd::grad({both(expected_x, expected_v)}, leaves);
+  const char* names[] = {"x", "v", "C", "F", "parameters"};
+  for (int i = 0; i < 5; ++i) {
+    EXPECT_GT(e[i].norm().item<double>(), 0) << names[i];
+    EXPECT_LE(((g[i] - e[i]).norm() / e[i].norm()).item<double>(), 1e-10) << names[i];
+  }
+}
+
+TEST(Rollout, TwoBodiesEachTakeTheirGradient) {
+  RolloutScene scene;
+  const LawDescription soft = sample_law(LawId::elastic);
+  const LawDescription fluid = sample_law(LawId::newtonian);
+  const Tensor a = parameters_of(soft).to(torch::kFloat32).requires_grad_();
+  const Tensor b = parameters_of(fluid).requires_grad_();
+  std::vector<RolloutBody> bodies{{0, 60, soft, a}, {60, 125, fluid, b}};
+  const auto run = [&] {
+    return rollout(scene.x, scene.v, {}, {}, scene.mass, scene.volume, bodies, scene.settings).x;
+  };
+  const auto g = torch::autograd::grad({loss_of(run())}, {a, b});
+  EXPECT_EQ(g[0].scalar_type(), torch::kFloat32);
+  EXPECT_EQ(g[1].scalar_type(), torch::kFloat64);
+  for (const int k : {0, 1}) {
+    const auto value = [&](const std::vector<double>& t) {
+      Tensor moved = b.detach().clone();
+      moved[k] = t[0];
+      bodies[1].parameters = moved;
+      return loss_of(run()).item<double>();
+    };
+    const double at = b[k].item<double>();
+    const auto expected = central_differences(value, {at}, {1e-4 * at});
+    EXPECT_LE(relative_error({g[1][k].item<double>()}, expected), 1e-6);
+  }
+}
+
+TEST(Rollout, SameBitsOnOneThreadAndOnTwo) {
+  const int before = omp_get_max_threads();
+  for (const auto type : {torch::kFloat32, torch::kFloat64}) {
+    for (const RolloutMaterial& m : rollout_materials()) {
+      std::vector<Tensor> results[2];
+      for (const int threads : {1, 2}) {
+        omp_set_num_threads(threads);
+        RolloutScene scene(type, 8);
+        scene.v.requires_grad_();
+        const Tensor p = m.parameters.clone().requires_grad_();
+        const Tensor frames = scene.run(m.law, p).x;
+        loss_of(frames).backward();
+        results[threads - 1] = {frames, scene.v.grad(), p.grad()};
+      }
+      for (int i = 0; i < 3; ++i) {
+        EXPECT_TRUE(torch::equal(results[0][i], results[1][i])) << m.name << " " << type << i;
+      }
+    }
+  }
+  omp_set_num_threads(before);
+}
+
+TEST(Rollout, UndefinedGradientsStayUndefinedAndConstantsNeedNoTape) {
+  RolloutScene scene;
+  const LawDescription law = sample_law(LawId::elastic);
+  const Tensor p = parameters_of(law).requires_grad_();
+  scene.settings.velocities = true;
+  loss_of(scene.run(law, p).v).backward();  // x is not used
+  EXPECT_TRUE(p.grad().defined());
+  for (const Tensor& t : {scene.x, scene.v, scene.C, scene.F}) EXPECT_FALSE(t.grad().defined());
+  EXPECT_FALSE(scene.run(law, {}).x.requires_grad());
+  {
+    torch::NoGradGuard off;
+    EXPECT_FALSE(scene.run(law, p).x.requires_grad());
+  }
+  // Two roll-outs at once do not share anything.
+  const Tensor one = scene.run(law, p).x, two = scene.run(law, 2 * p).x;
+  const Tensor g1 = torch::autograd::grad({loss_of(one)}, {p})[0];
+  const Tensor g2 = torch::autograd::grad({loss_of(two)}, {p})[0];
+  const Tensor again = torch::autograd::grad({loss_of(scene.run(law, p).x)}, {p})[0];
+  EXPECT_TRUE(torch::equal(g1, again));
+  EXPECT_FALSE(torch::equal(g1, g2));
+}
+
+TEST(Rollout, ErrorsNameTheArgument) {
+  const RolloutScene good;
+  const LawDescription law = sample_law(LawId::elastic);
+  const auto message =
+      [&](const std::function<void(RolloutScene&, RolloutBody&)>& spoil) -> std::string {
+    RolloutScene s;
+    RolloutBody body = s.body(law, {});
+    spoil(s, body);
+    try {
+      rollout(s.x, s.v, s.C, s.F, s.mass, s.volume, {body}, s.settings);
+    } catch (const Error& e) {
+      return e.what();
+    }
+    return "no error";
+  };
+  using ::testing::HasSubstr;
+  const auto single = [](const Tensor& t) { return t.to(torch::kFloat32); };
+  EXPECT_EQ(message([](RolloutScene&, RolloutBody&) {}), "no error");
+  EXPECT_EQ(message([](RolloutScene& s, RolloutBody&) { s.x = s.x.narrow(1, 0, 2); }),
+            "rollout: x0: expected [any, 3] Double on cpu, found [125, 2] Double on cpu");
+  EXPECT_THAT(message([](RolloutScene& s, RolloutBody&) { s.x = Tensor(); }),
+              HasSubstr("x0: expected a Float"));
+  EXPECT_THAT(message([&](RolloutScene& s, RolloutBody&) { s.v = single(s.v); }),
+              HasSubstr("v0: expected [125, 3] Double on cpu, found [125, 3] Float"));
+  EXPECT_THAT(message([&](RolloutScene& s, RolloutBody&) { s.C = s.C[0]; }),
+              HasSubstr("C0: expected"));
+  EXPECT_THAT(message([&](RolloutScene& s, RolloutBody&) { s.F = s.F[0]; }),
+              HasSubstr("F0: expected"));
+  EXPECT_THAT(message([&](RolloutScene& s, RolloutBody&) { s.mass = Tensor(); }),
+              HasSubstr("mass: expected"));
+  EXPECT_THAT(message([&](RolloutScene& s, RolloutBody&) { s.volume = single(s.volume); }),
+              HasSubstr("volume: expected"));
+  EXPECT_THAT(message([&](RolloutScene& s, RolloutBody&) { s.settings.every = 0; }),
+              HasSubstr("every >= 1"));
+  EXPECT_THAT(message([](RolloutScene&, RolloutBody& b) { b.parameters = torch::ones({3}); }),
+              HasSubstr("parameters of body 0: expected [2] Float on cpu, found [3] Float"));
+  EXPECT_THAT(message([](RolloutScene&, RolloutBody& b) { b.end = 100; }),
+              HasSubstr("bodies: expected the last one to end at particle 125, found 100"));
+  EXPECT_THAT(message([](RolloutScene& s, RolloutBody&) { s.x = s.x + 0.4; }),
+              HasSubstr("placed too close"));
+}
+
+}  // namespace
+}  // namespace uniphy::ops

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <array>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "ops/kernels/laws/law.hpp"
+#include "uniphy/io/latent_file.hpp"
+#include "uniphy/io/model_file.hpp"
+
+namespace uniphy {
+
+/// What a fit looks for: a point u in coordinates of order one, and the law that belongs to it.
+class FitVariables {
+ public:
+  virtual ~FitVariables() = default;
+  virtual int size() const = 0;
+  virtual kernels::LawDescription law(const std::vector<double>& u) const = 0;
+  /// dL/d(parameters of the law) → dL/du.
+  virtual std::vector<double> gradient(const std::vector<double>& u,
+                                       const std::vector<double>& by_parameters) const = 0;
+  /// ‖z‖² (0 for analytic laws, which have no prior), adding `weight` times its slope to *gradient.
+  virtual double prior(const std::vector<double>& u, double weight,
+                       std::vector<double>* gradient) const = 0;
+
+  /// Points to start from and the material that each stands for.
+  virtual int starts() const = 0;
+  virtual std::vector<double> start(int i) const = 0;
+  virtual std::string label(int i) const = 0;
+
+  /// The known points nearest to u, nearest first.
+  virtual std::vector<NearestCode> nearest(const std::vector<double>& u, int count) const;
+};
+
+/// The latent code of a trained model: u_k = (z_k − mean_k)/spread_k over the training codes (a
+/// spread of 0 counts as 1). It starts from those codes.
+std::unique_ptr<const FitVariables> make_latent_variables(const ModelFile& model);
+
+/// The parameters of an analytic law: u = (log p − middle)/half width over `ranges` of the
+/// logarithm, one [low, high] for each of parameter_names(id). Starts are drawn from them.
+std::unique_ptr<const FitVariables> make_analytic_variables(
+    kernels::LawId id, const std::vector<std::array<double, 2>>& ranges, int starts,
+    std::uint64_t seed);
+
+/// A parameter of a law by name ("mu", "lambda", "tau_y", "theta", "eta").
+double& law_parameter(kernels::LawDescription& law, const std::string& name);
+
+/// The ranges that the project draws the parameters of a law from, in the order of
+/// parameter_names(id).
+std::vector<std::array<double, 2>> default_ranges(kernels::LawId id);
+
+}  // namespace uniphy
