@@ -153,4 +153,26 @@ Tensor learned_stress(const SharedWeights& weights, const Tensor& F_proj, const 
   return apply(kernels::without_projection(*weights), F_proj, C, z).tau;
 }
 
+namespace {
+
+SharedWeights shared(const LearnedNetworks& networks) {
+  return std::make_shared<LearnedLawWeights>(to_weights(networks));
+}
+
+}  // namespace
+
+LawOutput learned_law(const LearnedNetworks& networks, const Tensor& F_trial, const Tensor& C,
+                      const Tensor& z) {
+  return learned_law(shared(networks), F_trial, C, z);
+}
+
+Tensor learned_project(const LearnedNetworks& networks, const Tensor& F, const Tensor& z) {
+  return learned_project(shared(networks), F, z);
+}
+
+Tensor learned_stress(const LearnedNetworks& networks, const Tensor& F_proj, const Tensor& C,
+                      const Tensor& z) {
+  return learned_stress(shared(networks), F_proj, C, z);
+}
+
 }  // namespace uniphy::ops

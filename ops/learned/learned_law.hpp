@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "ops/kernels/learned/learned_law_weights.hpp"
+#include "ops/learned/learned_networks.hpp"
 
 // The learned law as differentiable ops around its fused kernels
 // (ops/kernels/learned/learned_law.hpp, where the formulas stand). Gradients go to F, C and z; the
@@ -34,6 +35,13 @@ torch::Tensor learned_project(const SharedWeights& weights, const torch::Tensor&
 
 /// τ(F_proj, C); the projection network does not run.
 torch::Tensor learned_stress(const SharedWeights& weights, const torch::Tensor& F_proj,
+                             const torch::Tensor& C, const torch::Tensor& z);
+
+LawOutput learned_law(const LearnedNetworks& networks, const torch::Tensor& F_trial,
+                      const torch::Tensor& C, const torch::Tensor& z);
+torch::Tensor learned_project(const LearnedNetworks& networks, const torch::Tensor& F,
+                              const torch::Tensor& z);
+torch::Tensor learned_stress(const LearnedNetworks& networks, const torch::Tensor& F_proj,
                              const torch::Tensor& C, const torch::Tensor& z);
 
 }  // namespace uniphy::ops

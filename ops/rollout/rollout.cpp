@@ -185,9 +185,14 @@ RolloutFrames rollout(const Tensor& x0, const Tensor& v0, const Tensor& C0, cons
   }
   auto plan = c10::make_intrusive<Plan>();
   plan->bodies = bodies;
-  for (RolloutBody& body : plan->bodies) body.parameters = Tensor();  // `packed` carries them
+  for (RolloutBody& body : plan->bodies) {
+    if (!body.networks.defined()) continue;
+    body.law.id = LawId::learned;
+    body.law.weights = std::make_shared<kernels::LearnedLawWeights>(to_weights(body.networks));
+  }
   plan->settings = settings;
-  const Tensor packed = pack_parameters(bodies);
+  const Tensor packed = pack_parameters(plan->bodies);
+  for (RolloutBody& body : plan->bodies) body.parameters = Tensor();  // `packed` carries them
   const Tensor v = checked("rollout", "v0", v0, type, {P, 3});
   const Tensor m = checked("rollout", "mass", mass, type, {P}).detach();
   const Tensor V = checked("rollout", "volume", volume, type, {P}).detach();

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "ops/kernels/rollout/rollout.hpp"
+#include "ops/learned/learned_networks.hpp"
 
 namespace uniphy::ops {
 
@@ -16,6 +17,8 @@ struct RolloutBody {
   /// parameters in the order of kernels::parameter_names(law.id), or the latent z of a learned law.
   /// Replaces the numbers in `law`; undefined: those are used.
   torch::Tensor parameters;
+  /// The networks of a learned law; they take the place of law.weights.
+  LearnedNetworks networks = {};
 };
 
 struct RolloutSettings {
