@@ -35,7 +35,7 @@ LawErrors Objective::errors(const Networks& networks, const Tensor& z, const Ten
                             const Tensor& scale_rows) const {
   const Tensor scale = scales_.index_select(0, scale_rows);
   return form_ == kernels::LawForm::isotropic ? isotropic(networks, z, rows, scale)
-                                              : seed(networks, z, rows, scale);
+                                              : published(networks, z, rows, scale);
 }
 
 LawErrors Objective::isotropic(const Networks& networks, const Tensor& z, const Tensor& rows,
