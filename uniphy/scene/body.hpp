@@ -48,6 +48,10 @@ struct BodyDescription {
   bool in_place = false;
 
   Placement placement;
+  /// The body stands on the wall that gravity points at: the centre's coordinate along gravity is
+  /// set so that its surface, half a particle spacing beyond its particles, meets the plane of the
+  /// innermost nodes that the wall stops.
+  bool on_floor = false;
   double density = 1000;                                       ///< kg/m³
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();          ///< m/s
   Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();  ///< rad/s

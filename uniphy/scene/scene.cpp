@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "ops/kernels/base/error.hpp"
 #include "uniphy/scene/overlap.hpp"
@@ -27,14 +29,22 @@ void check_settings(const SceneDescription& scene) {
   }
 }
 
-// A placed body keeps clear of the nodes whose velocity the walls clamp; particles given in place
-// (a state of an earlier run, say) may lean on the walls and only have to stay on the grid.
+// The planes of the walls that act: the innermost nodes whose velocity is clamped, as far as a
+// particle there has its whole stencil on the grid. [low, high] m, the same on every axis.
+std::array<double, 2> wall_planes(const kernels::GridSettings& grid) {
+  const double dx = grid.dx();
+  return {std::max(static_cast<double>(grid.bound - 1), 0.5) * dx,
+          1 - std::max(static_cast<double>(grid.bound - 1), 1.5) * dx};
+}
+
 void check_extent(const BodyDescription& body, const BodyParticles& particles,
                   const kernels::GridSettings& grid) {
   const Bounds bounds = bounds_of(particles.x);
+  // Particles given in place (a state of an earlier run, say) may lean into the walls and only have
+  // to stay on the grid.
   const double dx = grid.dx();
-  const double low = body.in_place ? 0.5 * dx : std::max(1, grid.bound) * dx;
-  const double high = body.in_place ? 1 - 1.5 * dx : 1 - low;
+  const auto [low, high] =
+      body.in_place ? std::array<double, 2>{0.5 * dx, 1 - 1.5 * dx} : wall_planes(grid);
   for (int axis = 0; axis < 3; ++axis) {
     if (bounds.min[axis] >= low - 1e-12 && bounds.max[axis] <= high + 1e-12) continue;
     throw Error(fmt::format(
@@ -44,9 +54,37 @@ void check_extent(const BodyDescription& body, const BodyParticles& particles,
   }
 }
 
+// Moves the body along the axis of gravity until its surface, half a particle spacing beyond its
+// outermost particle, stands on the wall that it would fall to.
+void put_on_floor(const kernels::GridSettings& grid, BodyDescription& body,
+                  BodyParticles& particles) {
+  int axis = 0;
+  for (int k = 1; k < 3; ++k) {
+    if (std::abs(grid.gravity[k]) > std::abs(grid.gravity[axis])) axis = k;
+  }
+  if (grid.gravity[axis] == 0) {
+    throw Error(fmt::format(
+        "body \"{}\": on_floor: expected gravity, which says where the floor is, found none",
+        body.name));
+  }
+  if (body.in_place) {
+    throw Error(fmt::format(
+        "body \"{}\": on_floor: expected a body that is placed, found particles in place",
+        body.name));
+  }
+  const Bounds bounds = bounds_of(particles.x);
+  const double volume = std::accumulate(particles.volume.begin(), particles.volume.end(), 0.0);
+  const double half = 0.5 * std::cbrt(volume / static_cast<double>(particles.x.size()));
+  const auto [low, high] = wall_planes(grid);
+  const double shift =
+      grid.gravity[axis] < 0 ? low - (bounds.min[axis] - half) : high - (bounds.max[axis] + half);
+  for (Vector3d& x : particles.x) x[axis] += shift;
+  body.placement.centre[axis] += shift;
+}
+
 // The largest speed that the body can reach: what it has and what falling to the walls adds.
 double largest_speed(const BodyParticles& particles, const kernels::GridSettings& grid) {
-  const double low = grid.bound * grid.dx(), high = 1 - low;
+  const auto [low, high] = wall_planes(grid);
   double square = 0;
   for (std::size_t p = 0; p < particles.x.size(); ++p) {
     double fall = 0;
@@ -109,10 +147,12 @@ PlacedScene place_scene(const SceneDescription& scene) {
   placed.grid.check();
   placed.first.push_back(0);
   double stable = std::numeric_limits<double>::infinity();
+  std::vector<BodyDescription> bodies = scene.bodies;
   std::vector<BodyParticles> all;
-  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
-    const BodyDescription& body = scene.bodies[b];
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    BodyDescription& body = bodies[b];
     all.push_back(place_body(body));
+    if (body.on_floor) put_on_floor(scene.grid, body, all.back());
     const BodyParticles& particles = all.back();
     check_extent(body, particles, scene.grid);
     stable = std::min(stable, stable_step_of(scene, body, particles));
@@ -123,7 +163,7 @@ PlacedScene place_scene(const SceneDescription& scene) {
     placed.body.insert(placed.body.end(), particles.x.size(), static_cast<std::int32_t>(b));
     placed.first.push_back(placed.particles());
   }
-  check_overlap(scene.bodies, all);
+  check_overlap(bodies, all);
   placed.stable_dt = stable;
   if (!scene.dt) {
     if (!(std::isfinite(stable) && stable > 1e-12)) {

@@ -48,9 +48,9 @@ struct PlacedScene {
 };
 
 /// Fills and places all bodies and fixes dt and the number of steps. Throws Error naming the body
-/// and its extent where it does not stand within the walls (`bound` nodes from the border on every
-/// side), naming two bodies that overlap (overlap.hpp), and naming the body and the parameter where
-/// a law is not complete.
+/// and its extent where it does not stand between the walls, whose planes are the innermost nodes
+/// that they stop: (bound − 1) Δx and 1 − (bound − 1) Δx, naming two bodies that overlap
+/// (overlap.hpp), and naming the body and the parameter where a law is not complete.
 PlacedScene place_scene(const SceneDescription& scene);
 
 /// A scene that can run: the engine and the state before the first step (F = I, C = 0).

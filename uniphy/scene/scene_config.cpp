@@ -27,6 +27,9 @@ BodyDescription read_body(Section& section, std::size_t number) {
           .real_or("none", "size", std::optional<double>(0.3), positive(), "m",
                    "largest side of the bounding box; none: the shape's own numbers are metres")
           .value_or(0);
+  body.on_floor = section.boolean(
+      "on_floor", false,
+      "the body stands on the wall that gravity points at; center does not count along gravity");
   body.density = section.real("density", 1000, positive(), "kg/m^3", "mass density");
   body.velocity = vector3(section, "velocity", {0, 0, 0}, "m/s", "at the start");
   body.angular_velocity =

@@ -10,6 +10,7 @@
 #include "uniphy/io/observation.hpp"
 #include "uniphy/report/plot.hpp"
 #include "uniphy/report/progress.hpp"
+#include "uniphy/scene/scene_warnings.hpp"
 
 namespace uniphy {
 namespace {
@@ -29,6 +30,7 @@ void record_metrics(const SceneDescription& scene, const PlacedScene& placed, Me
   metrics.set("simulated_s", static_cast<double>(placed.steps) * placed.grid.dt);
   metrics.set("particles", static_cast<double>(placed.particles()));
   metrics.set("mass", std::accumulate(placed.mass.begin(), placed.mass.end(), 0.0));
+  const std::vector<double> per_cell = particles_per_cell(placed);
   for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
     std::string name = scene.bodies[b].name;
     std::replace_if(
@@ -36,6 +38,7 @@ void record_metrics(const SceneDescription& scene, const PlacedScene& placed, Me
     const auto first = placed.volume.begin() + placed.first[b];
     const auto last = placed.volume.begin() + placed.first[b + 1];
     metrics.set("particles." + name, static_cast<double>(last - first));
+    metrics.set("particles_per_cell." + name, per_cell[b]);
     metrics.set("volume." + name, std::accumulate(first, last, 0.0));
   }
 }
@@ -71,14 +74,8 @@ void simulate_into(const SceneDescription& scene, const SimulationOutput& output
                             scene.bodies.size()));
   }
   record_metrics(scene, placed, metrics);
-  // The margin is the user's to use up; the limit itself is not.
-  const double limit = placed.stable_dt / scene.safety;
-  if (placed.grid.dt > limit) {
-    fmt::print(
-        stderr,
-        "warning: dt is {:.3g} s, beyond the stable {:.3g} s; the run may blow up (auto takes "
-        "{:.3g} s)\n",
-        placed.grid.dt, limit, placed.stable_dt);
+  for (const std::string& warning : scene_warnings(scene, placed)) {
+    fmt::print(stderr, "warning: {}\n", warning);
   }
 
   TrajectoryHeader header;

@@ -21,8 +21,8 @@ SimulationOutput read_simulation_output(Section& config);
 
 /// Runs the scene and writes trajectory.h5, trajectory.xdmf, frames.png and, where it is asked for,
 /// observation.h5 into `out`; frames go to the disk as they come. Metrics: dt, stable_dt (s),
-/// steps, frames, simulated_s, particles and, for each body, particles.NAME and volume.NAME (m³),
-/// mass (kg), ns_per_particle_step.
+/// steps, frames, simulated_s, particles and, for each body, particles.NAME,
+/// particles_per_cell.NAME and volume.NAME (m³), mass (kg), ns_per_particle_step.
 void simulate_into(const SceneDescription& scene, const SimulationOutput& output, RunDirectory& out,
                    Metrics& metrics);
 

@@ -163,14 +163,72 @@ TEST(PlaceScene, DurationSetsTheSteps) {
 }
 
 TEST(PlaceScene, NamesTheBodyThatLeavesTheSpaceBetweenTheWalls) {
-  EXPECT_THAT(
-      error_of(one(ball({0.5, 0.2, 0.5}))),
-      AllOf(HasSubstr("body \"ball\": spans y from 0.1"), HasSubstr("within 0.15 to 0.85")));
+  EXPECT_THAT(error_of(one(ball({0.5, 0.17, 0.5}))),
+              AllOf(HasSubstr("body \"ball\": spans y from 0.0"), HasSubstr("within 0.1 to 0.9")));
   EXPECT_THAT(error_of(one(ball({0.95, 0.5, 0.5}))), HasSubstr("spans x from 0.8"));
-  EXPECT_THAT(error_of(one(ball({0.5, 0.5, 0.5}, 0.9))), HasSubstr("spans"));
-  SceneDescription thin = one(ball({0.5, 0.2, 0.5}));
+  EXPECT_THAT(error_of(one(ball({0.5, 0.5, 0.5}, 0.95))), HasSubstr("spans"));
+  // The planes of the walls are the innermost nodes that they stop.
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const double centre : {0.2, 0.8}) {
+      Vector3d at(0.5, 0.5, 0.5);
+      at[axis] = centre;
+      EXPECT_EQ(error_of(one(ball(at))), "no error") << axis << " " << centre;
+    }
+  }
+  SceneDescription thin = one(ball({0.5, 0.17, 0.5}));
   thin.grid.bound = 1;
   EXPECT_EQ(error_of(thin), "no error");
+}
+
+TEST(PlaceScene, PutsABodyOnTheFloor) {
+  // A lattice whose surface is half a spacing beyond its particles: 0.2/8/2.
+  BodyDescription body = ball({0.5, 0.6, 0.5});
+  body.solid = make_shape("box");
+  body.filling = {Filling::Kind::per_side, 8, 0, 0};
+  body.on_floor = true;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const double sign : {-1.0, 1.0}) {
+      SceneDescription scene = one(body);
+      std::fill(scene.grid.gravity, scene.grid.gravity + 3, 0.0);
+      scene.grid.gravity[axis] = 9.8 * sign;
+      const PlacedScene placed = place_scene(scene);
+      double least = 1, most = 0;
+      for (std::ptrdiff_t p = 0; p < placed.particles(); ++p) {
+        least = std::min(least, placed.x[3 * p + axis]);
+        most = std::max(most, placed.x[3 * p + axis]);
+      }
+      if (sign < 0) EXPECT_NEAR(least, 0.1 + 0.0125, 1e-12) << axis;
+      if (sign > 0) EXPECT_NEAR(most, 0.9 - 0.0125, 1e-12) << axis;
+    }
+  }
+  SceneDescription weightless = one(body);
+  weightless.grid.gravity[1] = 0;
+  EXPECT_THAT(error_of(weightless), HasSubstr("on_floor: expected gravity"));
+}
+
+TEST(RunScene, ABodyOnTheFloorStaysThereButForItsSag) {
+  BodyDescription body = ball({0.5, 0.6, 0.5}, 0.3);
+  body.solid = make_shape("box");
+  body.filling = {Filling::Kind::per_side, 12, 0, 0};
+  body.law.mu = 5e5;
+  body.law.lambda = 5e5;
+  body.on_floor = true;
+  SceneDescription scene = one(body);
+  scene.dt.reset();
+  scene.duration = 0.3;
+  const Trajectory trajectory = run_scene(scene);
+  double lowest = 0, sag = 0;
+  for (std::int64_t f = 0; f < trajectory.frames; ++f) {
+    double mean = 0;
+    for (std::int64_t p = 0; p < trajectory.particles; ++p) {
+      mean += trajectory.positions(f)[3 * p + 1] / static_cast<double>(trajectory.particles);
+    }
+    if (f == 0) lowest = mean;
+    sag = std::max(sag, lowest - mean);
+  }
+  // At rest the centre of a column sinks by ρ g H²/(3 E) = 0.2 mm; let go at once, by twice that.
+  EXPECT_LT(sag, 1e-3);
+  EXPECT_GT(sag, 1e-5);
 }
 
 TEST(PlaceScene, LetsStatesOfEarlierRunsLeanOnTheWalls) {
