@@ -6,33 +6,12 @@
 #include "uniphy/bench/bench_machine_isa.hpp"
 #include "uniphy/bench/subjects.hpp"
 
-namespace uniphy::kernels {
-inline namespace isa_baseline {
-double multiply_adds_of_isa(std::ptrdiff_t repeats, float* sink);
-}
-#if defined(UNIPHY_HAVE_X86_ISA)
-namespace isa_avx2 {
-double multiply_adds_of_isa(std::ptrdiff_t repeats, float* sink);
-}
-namespace isa_avx512 {
-double multiply_adds_of_isa(std::ptrdiff_t repeats, float* sink);
-}
-#endif
-}  // namespace uniphy::kernels
-
 namespace uniphy::bench {
-
-double multiply_adds(kernels::Isa isa, std::ptrdiff_t repeats, float* sink) {
-#if defined(UNIPHY_HAVE_X86_ISA)
-  if (isa == kernels::Isa::avx512) return kernels::isa_avx512::multiply_adds_of_isa(repeats, sink);
-  if (isa == kernels::Isa::avx2) return kernels::isa_avx2::multiply_adds_of_isa(repeats, sink);
-#endif
-  return kernels::isa_baseline::multiply_adds_of_isa(repeats, sink);
-}
 
 void bench_machine(const BenchOptions& options, int threads, BenchReport& report) {
   // What the CPU has, even where UNIPHY_ISA asks the kernels to use less.
   const kernels::Isa isa = kernels::available_isas().back();
+  const auto& machine = kernels::table_of<MachineTable>(isa);
   constexpr std::ptrdiff_t kRepeats = 1 << 18;
   double flops = 0;  // of one thread, the same in each call
   Measurer measurer(threads);
@@ -40,7 +19,7 @@ void bench_machine(const BenchOptions& options, int threads, BenchReport& report
 #pragma omp parallel
     {
       float sink = 0;
-      const double done = multiply_adds(isa, kRepeats, &sink);
+      const double done = machine.multiply_adds(kRepeats, &sink);
       if (omp_get_thread_num() == 0) flops = done + (sink > 1e30F ? 1 : 0);
     }
   });

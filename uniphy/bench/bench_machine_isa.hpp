@@ -2,13 +2,19 @@
 
 #include <cstddef>
 
-#include "ops/kernels/simd/isa.hpp"
+#include "ops/kernels/simd/dispatch.hpp"
 
 namespace uniphy::bench {
 
-/// `repeats` rounds of independent float32 multiply-adds that never leave the registers, with the
-/// vectors of the instruction set. Returns the flops done, 2 a multiply-add; *sink takes a result,
-/// so that the work has a purpose.
-double multiply_adds(kernels::Isa isa, std::ptrdiff_t repeats, float* sink);
+/// What is measured of the CPU itself, compiled for one instruction set.
+struct MachineTable {
+  /// `repeats` rounds of independent float32 multiply-adds that never leave the registers. Returns
+  /// the flops done, 2 a multiply-add; *sink takes a result, so that the work has a purpose.
+  double (*multiply_adds)(std::ptrdiff_t repeats, float* sink);
+};
 
 }  // namespace uniphy::bench
+
+namespace uniphy::kernels {
+UNIPHY_ISA_TABLE(bench::MachineTable)
+}  // namespace uniphy::kernels

@@ -1,11 +1,13 @@
 // Compiled once for each instruction set, as the kernels are.
 
 #include "ops/kernels/simd/lanes.hpp"
+#include "uniphy/bench/bench_machine_isa.hpp"
 
 namespace uniphy::kernels {
 inline namespace UNIPHY_ISA {
+namespace {
 
-double multiply_adds_of_isa(std::ptrdiff_t repeats, float* sink) {
+double multiply_adds(std::ptrdiff_t repeats, float* sink) {
   using V = Lanes<float>;
   // More chains than latency times units of any current CPU, and few enough for 16 registers.
   constexpr int kChains = 12;
@@ -19,6 +21,15 @@ double multiply_adds_of_isa(std::ptrdiff_t repeats, float* sink) {
   for (int c = 1; c < kChains; ++c) total = total + sum[c];
   *sink = lane_sum(total);
   return 2.0 * kChains * width_of<V> * static_cast<double>(repeats);
+}
+
+constexpr bench::MachineTable kTable{multiply_adds};
+
+}  // namespace
+
+template <>
+const bench::MachineTable& isa_table() {
+  return kTable;
 }
 
 }  // namespace UNIPHY_ISA

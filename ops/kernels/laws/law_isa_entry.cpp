@@ -17,24 +17,27 @@ inline namespace UNIPHY_ISA {
 namespace {
 
 template <class T>
-constexpr LawTable<T> make_table() {
-  return {svd3_batch<T>,
-          svd3_adjoint_batch<T>,
-          // In the order of LawId.
-          {law_entries<DirectLaw<IdentityProjection, NeoHookean>, T>(),
-           law_entries<DirectLaw<VolumetricProjection, Newtonian>, T>(),
-           law_entries<PlasticLaw<VonMises>, T>(), law_entries<PlasticLaw<DruckerPrager>, T>(),
-           law_entries<PlasticLaw<Viscoplastic>, T>(),
-           law_entries<DirectLaw<IdentityProjection, FixedCorotated>, T>(),
-           law_entries<DirectLaw<VolumetricProjection, Water>, T>()}};
-}
+constexpr LawTable<T> kTable{
+    svd3_batch<T>,
+    svd3_adjoint_batch<T>,
+    // In the order of LawId.
+    {law_entries<DirectLaw<IdentityProjection, NeoHookean>, T>(),
+     law_entries<DirectLaw<VolumetricProjection, Newtonian>, T>(),
+     law_entries<PlasticLaw<VonMises>, T>(), law_entries<PlasticLaw<DruckerPrager>, T>(),
+     law_entries<PlasticLaw<Viscoplastic>, T>(),
+     law_entries<DirectLaw<IdentityProjection, FixedCorotated>, T>(),
+     law_entries<DirectLaw<VolumetricProjection, Water>, T>()}};
 
 }  // namespace
 
-extern const LawTable<float> law_table_float;
-extern const LawTable<double> law_table_double;
-constexpr LawTable<float> law_table_float = make_table<float>();
-constexpr LawTable<double> law_table_double = make_table<double>();
+template <>
+const LawTable<float>& isa_table() {
+  return kTable<float>;
+}
+template <>
+const LawTable<double>& isa_table() {
+  return kTable<double>;
+}
 
 }  // namespace UNIPHY_ISA
 }  // namespace uniphy::kernels

@@ -2,7 +2,7 @@
 
 #include <cstddef>
 
-#include "ops/kernels/simd/isa.hpp"
+#include "ops/kernels/simd/dispatch.hpp"
 #include "ops/kernels/simd/view.hpp"
 
 namespace uniphy::kernels {
@@ -14,6 +14,11 @@ struct LawParameters {
   T mu = 0, lambda = 0, tau_y = 0, theta = 0, eta = 0;
 };
 inline constexpr int kLawParameters = 5;
+/// Its members, for loops over the places.
+template <class T>
+inline constexpr T LawParameters<T>::*kLawParameterMembers[kLawParameters] = {
+    &LawParameters<T>::mu, &LawParameters<T>::lambda, &LawParameters<T>::tau_y,
+    &LawParameters<T>::theta, &LawParameters<T>::eta};
 
 /// The number of analytic laws: LawId before `learned`.
 inline constexpr int kAnalyticLaws = 7;
@@ -52,14 +57,14 @@ struct LawTable {
   Law laws[kAnalyticLaws];  ///< indexed by LawId
 };
 
-/// The table of an available instruction set. Throws Error where this build or CPU lacks it.
-template <class T>
-const LawTable<T>& law_table(Isa isa);
+UNIPHY_ISA_TABLE(LawTable<float>)
+UNIPHY_ISA_TABLE(LawTable<double>)
 
-/// The table in use.
+/// The table of an instruction set, the active one by default. Throws Error where it is not
+/// available.
 template <class T>
-const LawTable<T>& law_table() {
-  return law_table<T>(active_isa());
+const LawTable<T>& law_table(Isa isa = active_isa()) {
+  return table_of<LawTable<T>>(isa);
 }
 
 }  // namespace uniphy::kernels

@@ -7,42 +7,8 @@
 
 #include "ops/kernels/base/error.hpp"
 #include "ops/kernels/simd/aligned_buffer.hpp"
-#include "ops/kernels/simd/isa.hpp"
 
 namespace uniphy::kernels {
-
-// Defined by learned_law_isa_entry.cpp, once for each instruction set.
-inline namespace isa_baseline {
-template <class T>
-const LearnedLawTable<T>& learned_law_isa_table();
-}
-#if defined(UNIPHY_HAVE_X86_ISA)
-namespace isa_avx2 {
-template <class T>
-const LearnedLawTable<T>& learned_law_isa_table();
-}
-namespace isa_avx512 {
-template <class T>
-const LearnedLawTable<T>& learned_law_isa_table();
-}
-#endif
-
-template <class T>
-const LearnedLawTable<T>& learned_law_table() {
-#if defined(UNIPHY_HAVE_X86_ISA)
-  switch (active_isa()) {
-    case Isa::avx512:
-      return isa_avx512::learned_law_isa_table<T>();
-    case Isa::avx2:
-      return isa_avx2::learned_law_isa_table<T>();
-    case Isa::baseline:
-      break;
-  }
-#endif
-  return isa_baseline::learned_law_isa_table<T>();
-}
-template const LearnedLawTable<float>& learned_law_table<float>();
-template const LearnedLawTable<double>& learned_law_table<double>();
 
 namespace {
 

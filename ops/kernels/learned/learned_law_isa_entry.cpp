@@ -2,7 +2,13 @@
 
 namespace uniphy::kernels {
 inline namespace UNIPHY_ISA {
-template const LearnedLawTable<float>& learned_law_isa_table<float>();
-template const LearnedLawTable<double>& learned_law_isa_table<double>();
+template <>
+const LearnedLawTable<float>& isa_table() {
+  return learned_law_isa_table<float>();
+}
+template <>
+const LearnedLawTable<double>& isa_table() {
+  return learned_law_isa_table<double>();
+}
 }  // namespace UNIPHY_ISA
 }  // namespace uniphy::kernels

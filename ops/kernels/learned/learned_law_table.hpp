@@ -1,6 +1,7 @@
 #pragma once
 
 #include "ops/kernels/mlp/packed_mlp.hpp"
+#include "ops/kernels/simd/dispatch.hpp"
 #include "ops/kernels/simd/view.hpp"
 
 namespace uniphy::kernels {
@@ -59,8 +60,13 @@ struct LearnedLawTable {
                        T* first_bias, const WeightGradient<T>* weights);
 };
 
+UNIPHY_ISA_TABLE(LearnedLawTable<float>)
+UNIPHY_ISA_TABLE(LearnedLawTable<double>)
+
 /// The table of the active instruction set (isa.hpp).
 template <class T>
-const LearnedLawTable<T>& learned_law_table();
+const LearnedLawTable<T>& learned_law_table() {
+  return table_of<LearnedLawTable<T>>();
+}
 
 }  // namespace uniphy::kernels

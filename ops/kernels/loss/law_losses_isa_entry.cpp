@@ -4,15 +4,22 @@
 
 namespace uniphy::kernels {
 inline namespace UNIPHY_ISA {
+namespace {
 
 template <class T>
-const LawLossesTable<T>& law_losses_isa_table() {
-  static constexpr LawLossesTable<T> kTable{law_losses<T>, law_losses_adjoint<T>,
-                                            isotropic_features<T>, isotropic_features_adjoint<T>};
-  return kTable;
+constexpr LawLossesTable<T> kTable{law_losses<T>, law_losses_adjoint<T>, isotropic_features<T>,
+                                   isotropic_features_adjoint<T>};
+
+}  // namespace
+
+template <>
+const LawLossesTable<float>& isa_table() {
+  return kTable<float>;
 }
-template const LawLossesTable<float>& law_losses_isa_table<float>();
-template const LawLossesTable<double>& law_losses_isa_table<double>();
+template <>
+const LawLossesTable<double>& isa_table() {
+  return kTable<double>;
+}
 
 }  // namespace UNIPHY_ISA
 }  // namespace uniphy::kernels

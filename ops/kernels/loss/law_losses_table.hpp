@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include "ops/kernels/loss/sample_columns.hpp"
-#include "ops/kernels/simd/isa.hpp"
+#include "ops/kernels/simd/dispatch.hpp"
 
 // What Algorithm 1 minimises, for the isotropic form: the errors of caps and moduli (outputs of the
 // two networks, formulas in isotropic_law.hpp) on samples of a trajectory. With r the share, R the
@@ -86,8 +86,14 @@ struct LawLossesTable {
   T (*features_adjoint)(const SampleFeatures<T>&, const T* grad_projection, const T* grad_stress);
 };
 
-/// Throws Error where the instruction set is not available.
+UNIPHY_ISA_TABLE(LawLossesTable<float>)
+UNIPHY_ISA_TABLE(LawLossesTable<double>)
+
+/// The table of an instruction set, the active one by default. Throws Error where it is not
+/// available.
 template <class T>
-const LawLossesTable<T>& law_losses_table(Isa isa = active_isa());
+const LawLossesTable<T>& law_losses_table(Isa isa = active_isa()) {
+  return table_of<LawLossesTable<T>>(isa);
+}
 
 }  // namespace uniphy::kernels

@@ -12,29 +12,31 @@ inline namespace UNIPHY_ISA {
 namespace {
 
 template <class T>
-constexpr MpmTable<T> make_table() {
-  return {stencil<T>,
-          deformation_update<T>,
-          deformation_update_adjoint<T>,
-          p2g_records<T>,
-          scatter<T>,
-          grid_update<T>,
-          grid_update_adjoint<T>,
-          gather<T>,
-          g2p_finish<T>,
-          g2p_adjoint_records<T>,
-          gather_adjoint<true, T>,
-          g2p_adjoint_finish<T>,
-          gather_adjoint<false, T>,
-          p2g_adjoint_finish<T>};
-}
+constexpr MpmTable<T> kTable{stencil<T>,
+                             deformation_update<T>,
+                             deformation_update_adjoint<T>,
+                             p2g_records<T>,
+                             scatter<T>,
+                             grid_update<T>,
+                             grid_update_adjoint<T>,
+                             gather<T>,
+                             g2p_finish<T>,
+                             g2p_adjoint_records<T>,
+                             gather_adjoint<true, T>,
+                             g2p_adjoint_finish<T>,
+                             gather_adjoint<false, T>,
+                             p2g_adjoint_finish<T>};
 
 }  // namespace
 
-extern const MpmTable<float> mpm_table_float;
-extern const MpmTable<double> mpm_table_double;
-constexpr MpmTable<float> mpm_table_float = make_table<float>();
-constexpr MpmTable<double> mpm_table_double = make_table<double>();
+template <>
+const MpmTable<float>& isa_table() {
+  return kTable<float>;
+}
+template <>
+const MpmTable<double>& isa_table() {
+  return kTable<double>;
+}
 
 }  // namespace UNIPHY_ISA
 }  // namespace uniphy::kernels

@@ -2,7 +2,7 @@
 
 #include "ops/kernels/mpm/grid.hpp"
 #include "ops/kernels/mpm/particle_chunk.hpp"
-#include "ops/kernels/simd/isa.hpp"
+#include "ops/kernels/simd/dispatch.hpp"
 
 namespace uniphy::kernels {
 
@@ -44,8 +44,14 @@ struct MpmTable {
 inline constexpr int kGatherPlanes = 12;         ///< of `moments` in gather
 inline constexpr int kGatherAdjointPlanes = 19;  ///< of `moments` in gather_adjoint, gather_slopes
 
-/// The loops for one instruction set, which must be available; for the active one by default.
+UNIPHY_ISA_TABLE(MpmTable<float>)
+UNIPHY_ISA_TABLE(MpmTable<double>)
+
+/// The loops for an instruction set, the active one by default. Throws Error where it is not
+/// available.
 template <class T>
-const MpmTable<T>& mpm_table(Isa isa = active_isa());
+const MpmTable<T>& mpm_table(Isa isa = active_isa()) {
+  return table_of<MpmTable<T>>(isa);
+}
 
 }  // namespace uniphy::kernels
