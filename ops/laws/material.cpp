@@ -8,6 +8,7 @@
 #include "ops/base/tensor_check.hpp"
 #include "ops/kernels/base/error.hpp"
 #include "ops/kernels/laws/analytic_law.hpp"
+#include "ops/kernels/laws/law_parameters.hpp"
 
 namespace uniphy::ops {
 
@@ -30,12 +31,11 @@ Tensor pack_material(const char* op, kernels::LawId law, const Material& m) {
   if (law == kernels::LawId::learned)
     throw Error(std::string(op) + ": law: expected an analytic one, found learned");
   const Parameter* const all[] = {&m.mu, &m.lambda, &m.tau_y, &m.theta, &m.eta};
-  const char* const names[] = {"mu", "lambda", "tau_y", "theta", "eta"};
   std::vector<Tensor> entries;
-  for (int i = 0; i < kernels::kLawParameters; ++i) {
-    const Tensor& t = all[i]->tensor();
+  for (const kernels::LawParameter& p : kernels::kLawParameterTable) {
+    const Tensor& t = all[p.place]->tensor();
     if (!t.defined() || t.numel() != 1 || !t.is_floating_point() || !t.device().is_cpu())
-      fail(op, names[i], "one Float or Double number on cpu", t);
+      fail(op, p.name, "one Float or Double number on cpu", t);
     entries.push_back(t.to(torch::kFloat64).reshape({}));
   }
   const Tensor packed = torch::stack(entries);
@@ -43,11 +43,8 @@ Tensor pack_material(const char* op, kernels::LawId law, const Material& m) {
   const double* v = values.data_ptr<double>();
   kernels::LawDescription description;
   description.id = law;
-  description.mu = v[0];
-  description.lambda = v[1];
-  description.tau_y = v[2];
-  description.theta = v[3];
-  description.eta = v[4];
+  for (const kernels::LawParameter& p : kernels::kLawParameterTable)
+    description.*p.member = v[p.place];
   kernels::check_parameters(description);
   return packed;
 }
@@ -55,7 +52,10 @@ Tensor pack_material(const char* op, kernels::LawId law, const Material& m) {
 template <class T>
 kernels::LawParameters<T> law_parameters(const Tensor& packed) {
   const double* v = packed.data_ptr<double>();
-  return {T(v[0]), T(v[1]), T(v[2]), T(v[3]), T(v[4])};
+  kernels::LawParameters<T> parameters;
+  for (int i = 0; i < kernels::kLawParameters; ++i)
+    parameters.*kernels::kLawParameterMembers<T>[i] = T(v[i]);
+  return parameters;
 }
 template kernels::LawParameters<float> law_parameters<float>(const Tensor&);
 template kernels::LawParameters<double> law_parameters<double>(const Tensor&);

@@ -25,7 +25,7 @@ class Parameter {
 };
 
 /// One material for all particles of a call. A law looks only at the parameters that it has
-/// (kernels::parameter_names); the gradient of the others is zero.
+/// (kernels::law_parameters); the gradient of the others is zero.
 struct Material {
   Parameter mu;      ///< Pa (Pa s for newtonian)
   Parameter lambda;  ///< Pa
@@ -34,7 +34,8 @@ struct Material {
   Parameter eta;     ///< Pa s
 };
 
-/// mu, lambda, tau_y, theta, eta as one float64 tensor [5]; differentiable. `op` opens the message
+/// All parameters in the order of kernels::kLawParameterTable as one float64 tensor [5];
+/// differentiable. `op` opens the message
 /// of the Error where a tensor is not a single floating-point number on the CPU or where the law
 /// cannot have the value.
 torch::Tensor pack_material(const char* op, kernels::LawId law, const Material& material);
@@ -84,14 +85,12 @@ torch::Tensor sum_over_blocks(std::ptrdiff_t particles, const torch::Tensor& pac
          wanted ? &shares[static_cast<std::size_t>(first / kParticleBlock)] : nullptr);
   });
   if (!wanted) return {};
-  double total[kernels::kLawParameters] = {};
-  for (const auto& s : shares) {
-    const double share[] = {double(s.mu), double(s.lambda), double(s.tau_y), double(s.theta),
-                            double(s.eta)};
-    for (int i = 0; i < kernels::kLawParameters; ++i) total[i] += share[i];
+  torch::Tensor sum = at::zeros_like(packed);
+  double* total = sum.data_ptr<double>();
+  for (const auto& share : shares) {
+    for (int i = 0; i < kernels::kLawParameters; ++i)
+      total[i] += double(share.*kernels::kLawParameterMembers<T>[i]);
   }
-  torch::Tensor sum = at::empty_like(packed);
-  for (int i = 0; i < kernels::kLawParameters; ++i) sum.data_ptr<double>()[i] = total[i];
   return sum;
 }
 

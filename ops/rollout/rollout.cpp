@@ -7,10 +7,10 @@
 #include "ops/base/once_differentiable.hpp"
 #include "ops/base/tensor_check.hpp"
 #include "ops/kernels/base/error.hpp"
+#include "ops/kernels/laws/law_parameters.hpp"
 
 namespace uniphy::ops {
 
-using kernels::LawDescription;
 using kernels::LawId;
 using torch::Tensor;
 using torch::autograd::AutogradContext;
@@ -37,49 +37,15 @@ std::vector<T> to_vector(const Tensor& t) {
   return {t.data_ptr<T>(), t.data_ptr<T>() + t.numel()};
 }
 
-std::ptrdiff_t parameter_count(const LawDescription& law) {
-  if (law.id != LawId::learned) return std::ptrdiff_t(kernels::parameter_names(law.id).size());
-  return law.weights != nullptr ? law.weights->latent_size : std::ptrdiff_t(law.z.size());
-}
-
-std::vector<double> parameter_values(const LawDescription& law) {
-  if (law.id == LawId::learned) return law.z;
-  std::vector<double> values;
-  for (const std::string& name : kernels::parameter_names(law.id)) {
-    values.push_back(name == "mu"       ? law.mu
-                     : name == "lambda" ? law.lambda
-                     : name == "tau_y"  ? law.tau_y
-                     : name == "theta"  ? law.theta
-                                        : law.eta);
-  }
-  return values;
-}
-
-LawDescription with_parameters(LawDescription law, const double* values) {
-  if (law.id == LawId::learned) {
-    law.z.assign(values, values + parameter_count(law));
-    return law;
-  }
-  for (const std::string& name : kernels::parameter_names(law.id)) {
-    double& to = name == "mu"       ? law.mu
-                 : name == "lambda" ? law.lambda
-                 : name == "tau_y"  ? law.tau_y
-                 : name == "theta"  ? law.theta
-                                    : law.eta;
-    to = *values++;
-  }
-  return law;
-}
-
 /// All parameters of all bodies, one after the other, float64; differentiable.
 Tensor pack_parameters(const std::vector<RolloutBody>& bodies) {
   variable_list all;
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     const std::string name = "parameters of body " + std::to_string(b);
-    const std::int64_t count = parameter_count(bodies[b].law);
+    const std::int64_t count = kernels::parameter_count(bodies[b].law);
     Tensor values = bodies[b].parameters;
     if (!values.defined()) {
-      values = torch::tensor(parameter_values(bodies[b].law), torch::kFloat64);
+      values = torch::tensor(kernels::parameter_values(bodies[b].law), torch::kFloat64);
     }
     const auto type = real_type("rollout", name.c_str(), values);
     all.push_back(checked("rollout", name.c_str(), values, type, {count}).to(torch::kFloat64));
@@ -95,8 +61,8 @@ kernels::Rollout<T> make_rollout(const Plan& plan, const Tensor& parameters, con
   std::vector<kernels::BodyRange<T>> ranges;
   for (const RolloutBody& body : plan.bodies) {
     ranges.push_back(
-        {body.begin, body.end, kernels::make_law<T>(with_parameters(body.law, values))});
-    values += parameter_count(body.law);
+        {body.begin, body.end, kernels::make_law<T>(kernels::with_parameters(body.law, values))});
+    values += kernels::parameter_count(body.law);
   }
   return {plan.settings.grid, ranges, to_vector<T>(mass), to_vector<T>(volume)};
 }

@@ -14,7 +14,7 @@ struct RolloutBody {
   std::ptrdiff_t begin = 0, end = 0;
   kernels::LawDescription law;
   /// What the law is conditioned on and differentiated by, [N], float32 or float64: the material
-  /// parameters in the order of kernels::parameter_names(law.id), or the latent z of a learned law.
+  /// parameters in the order of kernels::law_parameters(law.id), or the latent z of a learned law.
   /// Replaces the numbers in `law`; undefined: those are used.
   torch::Tensor parameters;
   /// The networks of a learned law; they take the place of law.weights.

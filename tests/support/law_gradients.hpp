@@ -4,7 +4,7 @@
 #include <numeric>
 #include <vector>
 
-#include "ops/kernels/laws/analytic_law.hpp"
+#include "ops/kernels/laws/law_parameters.hpp"
 #include "tests/support/finite_differences.hpp"
 #include "tests/support/law_cases.hpp"
 
@@ -17,10 +17,12 @@ inline const char* stage_name(Stage stage) {
   return stage == Stage::project ? "project" : stage == Stage::stress ? "stress" : "fused";
 }
 
-using ParameterArray = std::vector<double>;  ///< mu, lambda, tau_y, theta, eta
+using ParameterArray = std::vector<double>;  ///< in the order of kLawParameterTable
 
 inline ParameterArray parameter_array(const kernels::LawDescription& d) {
-  return {d.mu, d.lambda, d.tau_y, d.theta, d.eta};
+  ParameterArray values;
+  for (const kernels::LawParameter& p : kernels::kLawParameterTable) values.push_back(d.*p.member);
+  return values;
 }
 inline kernels::LawParameters<double> to_parameters(const ParameterArray& p) {
   return {p[0], p[1], p[2], p[3], p[4]};
@@ -127,7 +129,8 @@ inline LawGradientCheck make_check(kernels::LawId id, Stage stage, kernels::Isa 
                                    std::mt19937_64& random) {
   LawGradientCheck check;
   check.law = kernels::law_table<double>(isa).laws[static_cast<int>(id)];
-  check.places = kernels::parameter_places(id);
+  for (const kernels::LawParameter& p : kernels::law_parameters(id))
+    check.places.push_back(p.place);
   check.stage = stage;
   check.W1 = random_matrix(random);
   check.W2 = random_matrix(random, 1e-5);

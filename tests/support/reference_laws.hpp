@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "ops/kernels/laws/law.hpp"
+#include "ops/kernels/laws/law_parameters.hpp"
 
 namespace uniphy::testing {
 
@@ -44,11 +44,8 @@ inline ReferenceLaw read_reference_law(const std::string& law) {
     return values;
   };
   r.dt = attribute("dt");
-  r.description.mu = attribute("mu");
-  r.description.lambda = attribute("lambda");
-  r.description.tau_y = attribute("tau_y");
-  r.description.theta = attribute("theta");
-  r.description.eta = attribute("eta");
+  for (const kernels::LawParameter& p : kernels::kLawParameterTable)
+    r.description.*p.member = attribute(p.name);
   r.F = dataset("F");
   r.C = dataset("C");
   r.F_proj = dataset("F_proj");

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "ops/kernels/laws/law_parameters.hpp"
 #include "ops/rollout/rollout.hpp"
 #include "tests/support/finite_differences.hpp"
 #include "tests/support/law_cases.hpp"
@@ -53,15 +54,7 @@ inline torch::Tensor loss_of(const torch::Tensor& frames) {
 }
 
 inline torch::Tensor parameters_of(const kernels::LawDescription& law) {
-  std::vector<double> values;
-  for (const std::string& name : kernels::parameter_names(law.id)) {
-    values.push_back(name == "mu"       ? law.mu
-                     : name == "lambda" ? law.lambda
-                     : name == "tau_y"  ? law.tau_y
-                     : name == "theta"  ? law.theta
-                                        : law.eta);
-  }
-  return torch::tensor(values, torch::kFloat64);
+  return torch::tensor(kernels::parameter_values(law), torch::kFloat64);
 }
 
 struct RolloutMaterial {

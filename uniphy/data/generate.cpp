@@ -27,12 +27,8 @@ std::uint64_t hash_text(const std::string& text) {
 
 std::string describe(const TrajectorySetup& setup) {
   std::string text = setup.record.material;
-  for (const std::string& name : kernels::parameter_names(setup.law().id)) {
-    for (std::size_t k = 0; k < kParameterNames.size(); ++k) {
-      if (name != kParameterNames[k]) continue;
-      text += fmt::format(", {} {:.4g}", name, setup.record.parameters[k]);
-    }
-  }
+  for (const kernels::LawParameter& p : kernels::law_parameters(setup.law().id))
+    text += fmt::format(", {} {:.4g}", p.name, setup.record.parameters[p.place]);
   return fmt::format("{}, {} {}", text, setup.motion, setup.record.shape);
 }
 

@@ -19,12 +19,8 @@ std::string ranges(const GenerateOptions& o) {
   std::string text = "ranges:\n";
   for (const MaterialRanges& material : o.materials) {
     text += fmt::format("  {}:\n", material.name());
-    for (const std::string& parameter : kernels::parameter_names(material.id)) {
-      for (std::size_t k = 0; k < kParameterNames.size(); ++k) {
-        if (parameter != kParameterNames[k]) continue;
-        text += fmt::format("    {}: {}\n", parameter, interval(material.interval[k]));
-      }
-    }
+    for (const kernels::LawParameter& p : kernels::law_parameters(material.id))
+      text += fmt::format("    {}: {}\n", p.name, interval(material.interval[p.place]));
   }
   return text;
 }

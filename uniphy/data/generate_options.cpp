@@ -3,30 +3,15 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <map>
 
 #include "ops/kernels/base/error.hpp"
 #include "uniphy/geometry/shape_catalogue.hpp"
+#include "uniphy/scene/law_config.hpp"
 
 namespace uniphy {
 namespace {
 
 using kernels::LawId;
-
-const std::map<std::string, std::string>& parameter_docs() {
-  static const std::map<std::string, std::string> docs{
-      {"mu", "shear modulus (newtonian: viscosity, Pa s)"},
-      {"lambda", "first Lamé parameter"},
-      {"tau_y", "yield stress"},
-      {"theta", "friction angle"},
-      {"eta", "plastic viscosity"}};
-  return docs;
-}
-
-std::string unit_of(const std::string& parameter) {
-  if (parameter == "theta") return "rad";
-  return parameter == "eta" ? "Pa s" : "Pa";
-}
 
 void read_materials(Section& config, GenerateOptions& options) {
   std::vector<std::string> names;
@@ -38,14 +23,11 @@ void read_materials(Section& config, GenerateOptions& options) {
   std::vector<MaterialRanges> read;
   for (MaterialRanges ranges : default_material_ranges()) {
     Section section = all.section(ranges.name(), "");
-    for (const std::string& parameter : kernels::parameter_names(ranges.id)) {
-      for (std::size_t k = 0; k < kParameterNames.size(); ++k) {
-        if (parameter != kParameterNames[k]) continue;
-        Range range = positive();
-        if (parameter == "theta") range.high = 1.5;
-        ranges.interval[k] = section.interval(parameter, ranges.interval[k], range,
-                                              unit_of(parameter), parameter_docs().at(parameter));
-      }
+    for (const kernels::LawParameter& p : kernels::law_parameters(ranges.id)) {
+      Range range = range_of(p);
+      range.low_open = true;  // they are drawn as logarithms
+      auto& interval = ranges.interval[static_cast<std::size_t>(p.place)];
+      interval = section.interval(p.name, interval, range, p.unit, p.text);
     }
     read.push_back(ranges);
   }

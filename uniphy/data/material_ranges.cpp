@@ -1,6 +1,5 @@
 #include "uniphy/data/material_ranges.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -8,22 +7,9 @@
 #include "uniphy/geometry/random.hpp"
 
 namespace uniphy {
-namespace {
 
 using kernels::LawDescription;
 using kernels::LawId;
-
-constexpr std::array<double LawDescription::*, 5> kMembers{
-    &LawDescription::mu, &LawDescription::lambda, &LawDescription::tau_y, &LawDescription::theta,
-    &LawDescription::eta};
-constexpr std::size_t kTheta = 3;
-
-bool has_parameter(LawId id, std::size_t k) {
-  const auto& names = kernels::parameter_names(id);
-  return std::find(names.begin(), names.end(), kParameterNames[k]) != names.end();
-}
-
-}  // namespace
 
 const std::vector<MaterialRanges>& default_material_ranges() {
   static const std::vector<MaterialRanges> ranges{
@@ -59,21 +45,14 @@ std::array<double, 5> LatinHypercube::point(std::int64_t i,
 LawDescription material_at(const MaterialRanges& ranges, const std::array<double, 5>& unit) {
   LawDescription law;
   law.id = ranges.id;
-  for (std::size_t k = 0; k < unit.size(); ++k) {
-    if (!has_parameter(ranges.id, k)) continue;
+  for (const kernels::LawParameter& p : kernels::law_parameters(ranges.id)) {
+    const auto k = static_cast<std::size_t>(p.place);
     const auto [low, high] = ranges.interval[k];
-    law.*kMembers[k] =
-        k == kTheta ? low + (high - low) * unit[k] : low * std::exp(std::log(high / low) * unit[k]);
+    law.*p.member = p.member == &LawDescription::theta
+                        ? low + (high - low) * unit[k]
+                        : low * std::exp(std::log(high / low) * unit[k]);
   }
   return law;
-}
-
-MaterialParameters parameters_of(const LawDescription& law) {
-  MaterialParameters parameters = no_parameters();
-  for (std::size_t k = 0; k < parameters.size(); ++k) {
-    if (has_parameter(law.id, k)) parameters[k] = law.*kMembers[k];
-  }
-  return parameters;
 }
 
 double yield_norm(const LawDescription& law, double trace) {

@@ -5,13 +5,12 @@
 #include <string>
 #include <vector>
 
-#include "ops/kernels/laws/law.hpp"
-#include "uniphy/io/dataset.hpp"
+#include "uniphy/io/material_parameters.hpp"
 
 namespace uniphy {
 
 /// The intervals that the parameters of one material are drawn from, in the order of
-/// kParameterNames; [0, 0] where the law has none.
+/// kernels::kLawParameterTable; [0, 0] where the law has none.
 struct MaterialRanges {
   kernels::LawId id = kernels::LawId::elastic;
   std::array<std::array<double, 2>, 5> interval{};
@@ -40,9 +39,6 @@ class LatinHypercube {
 /// Parameters at a point of the unit cube: log-uniform between the ends, theta uniform.
 kernels::LawDescription material_at(const MaterialRanges& ranges,
                                     const std::array<double, 5>& unit);
-
-/// The row of /trajectories/parameters: NaN where the law has no such parameter.
-MaterialParameters parameters_of(const kernels::LawDescription& law);
 
 /// The norm of the deviatoric Hencky strain at which a law yields where tr ε is `trace`:
 /// τ_Y/(2μ) for plasticine and non_newtonian; for sand −α (3λ+2μ)/(2μ) trace, and 0 where trace > 0

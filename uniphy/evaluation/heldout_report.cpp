@@ -68,7 +68,8 @@ std::int64_t EvaluatedSet::failed() const {
 
 std::string errors_csv(const std::vector<EvaluatedSet>& sets) {
   std::string csv = "set,trajectory,material,shape,motion";
-  for (const char* name : kParameterNames) csv += fmt::format(",{}", name);
+  for (const kernels::LawParameter& p : kernels::kLawParameterTable)
+    csv += fmt::format(",{}", p.name);
   csv += ",dt,stress_error,projection_error,rollout_error,failure,z\n";
   for (const EvaluatedSet& set : sets) {
     for (std::size_t i = 0; i < set.rollouts.size(); ++i) {

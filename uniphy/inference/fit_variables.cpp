@@ -81,10 +81,10 @@ class AnalyticFitVariables : public FitVariables {
  public:
   AnalyticFitVariables(kernels::LawId id, const std::vector<std::array<double, 2>>& ranges,
                        int starts, std::uint64_t seed)
-      : id_(id), names_(kernels::parameter_names(id)) {
-    if (ranges.size() != names_.size()) {
+      : id_(id), parameters_(kernels::law_parameters(id)) {
+    if (ranges.size() != parameters_.size()) {
       throw Error(std::string("law ") + kernels::law_name(id) + ": expected " +
-                  std::to_string(names_.size()) + " ranges, found " +
+                  std::to_string(parameters_.size()) + " ranges, found " +
                   std::to_string(ranges.size()));
     }
     for (const auto& range : ranges) {
@@ -94,18 +94,18 @@ class AnalyticFitVariables : public FitVariables {
     UniformRandom random(seed);
     for (int i = 0; i < starts; ++i) {
       std::vector<double> u;
-      for (std::size_t k = 0; k < names_.size(); ++k) u.push_back(random.between(-1, 1));
+      for (std::size_t k = 0; k < parameters_.size(); ++k) u.push_back(random.between(-1, 1));
       starts_.push_back(std::move(u));
     }
   }
 
-  int size() const override { return static_cast<int>(names_.size()); }
+  int size() const override { return static_cast<int>(parameters_.size()); }
 
   kernels::LawDescription law(const std::vector<double>& u) const override {
     kernels::LawDescription description;
     description.id = id_;
     for (int k = 0; k < size(); ++k) {
-      law_parameter(description, names_[k]) = std::exp(middle_[k] + half_[k] * u[k]);
+      description.*parameters_[k].member = std::exp(middle_[k] + half_[k] * u[k]);
     }
     return description;
   }
@@ -129,7 +129,7 @@ class AnalyticFitVariables : public FitVariables {
 
  private:
   kernels::LawId id_;
-  std::vector<std::string> names_;
+  const std::vector<kernels::LawParameter>& parameters_;
   std::vector<double> middle_, half_;
   std::vector<std::vector<double>> starts_;
 };
@@ -161,15 +161,6 @@ std::unique_ptr<const FitVariables> make_analytic_variables(
   return std::make_unique<AnalyticFitVariables>(id, ranges, starts, seed);
 }
 
-double& law_parameter(kernels::LawDescription& law, const std::string& name) {
-  if (name == "mu") return law.mu;
-  if (name == "lambda") return law.lambda;
-  if (name == "tau_y") return law.tau_y;
-  if (name == "theta") return law.theta;
-  if (name == "eta") return law.eta;
-  throw Error("law: expected a parameter of a law, found \"" + name + "\"");
-}
-
 std::vector<std::array<double, 2>> default_ranges(kernels::LawId id) {
   // The laws beside the five are elastic at small strain.
   const bool other = id == kernels::LawId::fixed_corotated || id == kernels::LawId::water;
@@ -177,11 +168,8 @@ std::vector<std::array<double, 2>> default_ranges(kernels::LawId id) {
   std::vector<std::array<double, 2>> ranges;
   for (const MaterialRanges& material : default_material_ranges()) {
     if (material.id != like) continue;
-    for (const std::string& name : kernels::parameter_names(id)) {
-      for (std::size_t k = 0; k < kParameterNames.size(); ++k) {
-        if (name == kParameterNames[k]) ranges.push_back(material.interval[k]);
-      }
-    }
+    for (const kernels::LawParameter& p : kernels::law_parameters(id))
+      ranges.push_back(material.interval[p.place]);
   }
   return ranges;
 }

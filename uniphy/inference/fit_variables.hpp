@@ -38,16 +38,13 @@ class FitVariables {
 std::unique_ptr<const FitVariables> make_latent_variables(const ModelFile& model);
 
 /// The parameters of an analytic law: u = (log p − middle)/half width over `ranges` of the
-/// logarithm, one [low, high] for each of parameter_names(id). Starts are drawn from them.
+/// logarithm, one [low, high] for each of law_parameters(id). Starts are drawn from them.
 std::unique_ptr<const FitVariables> make_analytic_variables(
     kernels::LawId id, const std::vector<std::array<double, 2>>& ranges, int starts,
     std::uint64_t seed);
 
-/// A parameter of a law by name ("mu", "lambda", "tau_y", "theta", "eta").
-double& law_parameter(kernels::LawDescription& law, const std::string& name);
-
 /// The ranges that the project draws the parameters of a law from, in the order of
-/// parameter_names(id).
+/// law_parameters(id).
 std::vector<std::array<double, 2>> default_ranges(kernels::LawId id);
 
 }  // namespace uniphy

@@ -88,11 +88,11 @@ FitVariablesSource read_fit_variables(Section& config) {
            const auto defaults = default_ranges(id);
            source.ranges.clear();
            for (std::size_t k = 0; k < defaults.size(); ++k) {
-             const std::string& name = kernels::parameter_names(id)[k];
-             LawParameterKey key = law_parameter_key(id, name);
-             key.range.low_open = true;  // they are fitted as logarithms
+             const kernels::LawParameter& p = kernels::law_parameters(id)[k];
+             Range range = range_of(p);
+             range.low_open = true;  // they are fitted as logarithms
              source.ranges.push_back(
-                 s.interval(name, defaults[k], key.range, key.unit, "starts are drawn from here"));
+                 s.interval(p.name, defaults[k], range, p.unit, "starts are drawn from here"));
            }
            source.starts = static_cast<int>(
                s.integer("starts", 100, between(1, 100000), "", "points that are tried first"));

@@ -19,7 +19,7 @@ FitOptions read_fit_options(Section& config);
 struct FitVariablesSource {
   kernels::LawId id = kernels::LawId::learned;
   std::filesystem::path model;                ///< learned
-  std::vector<std::array<double, 2>> ranges;  ///< analytic, in the order of parameter_names(id)
+  std::vector<std::array<double, 2>> ranges;  ///< analytic, in the order of law_parameters(id)
   int starts = 0;
   std::uint64_t seed = 0;
 

@@ -117,10 +117,8 @@ void add_metrics(Metrics& metrics, const Inference& inference, const Observation
     metrics.set(fmt::format("angular_velocity.{}", axes[k]), fit.motion.angular[k]);
   }
   metrics.set("nearest.distance", variables.nearest(fit.u, 1).front().distance);
-  kernels::LawDescription law = fit.law;
-  for (const std::string& name : kernels::parameter_names(law.id)) {
-    metrics.set("parameter." + name, law_parameter(law, name));
-  }
+  for (const kernels::LawParameter& p : kernels::law_parameters(fit.law.id))
+    metrics.set(std::string("parameter.") + p.name, fit.law.*p.member);
 }
 
 Chart loss_chart(const FitResult& fit, const FitVariables& variables, const std::string& title) {

@@ -81,9 +81,8 @@ void DatasetWriter::finish() {
     attempt.push_back(record.attempt);
   }
   writer_.write_strings("trajectories/material", material, {"1", "name of the law"});
-  writer_.write(
-      "trajectories/parameters", parameters, {count, 5},
-      {"Pa, Pa, Pa, rad, Pa s", "mu, lambda, tau_y, theta, eta; NaN where there is none"});
+  writer_.write("trajectories/parameters", parameters, {count, kernels::kLawParameters},
+                material_parameter_info());
   writer_.write("trajectories/dt", dt, {count}, {"s", "time step"});
   writer_.write("trajectories/density", density, {count}, {"kg/m^3", "density"});
   writer_.write("trajectories/seed", seed, {count}, {"1", "seed that drew the trajectory"});
@@ -103,7 +102,8 @@ Dataset read_dataset(const std::filesystem::path& file) {
   if (count == 0) {
     reader.fail("/trajectories/material", "expected at least one trajectory, found none");
   }
-  const auto parameters = reader.read<double>("trajectories/parameters", {count, 5});
+  const auto parameters =
+      reader.read<double>("trajectories/parameters", {count, kernels::kLawParameters});
   const auto dt = reader.read<double>("trajectories/dt", {count}, hdf5::Values::finite);
   const auto density = reader.read<double>("trajectories/density", {count}, hdf5::Values::finite);
   const auto seed = reader.read<std::int64_t>("trajectories/seed", {count});

@@ -27,18 +27,9 @@
 #include <vector>
 
 #include "uniphy/io/hdf5.hpp"
+#include "uniphy/io/material_parameters.hpp"
 
 namespace uniphy {
-
-/// mu, lambda, tau_y, theta, eta; NaN where the law has none.
-using MaterialParameters = std::array<double, 5>;
-inline constexpr std::array<const char*, 5> kParameterNames{"mu", "lambda", "tau_y", "theta",
-                                                            "eta"};
-inline MaterialParameters no_parameters() {
-  MaterialParameters parameters;
-  parameters.fill(std::numeric_limits<double>::quiet_NaN());
-  return parameters;
-}
 
 struct TrajectoryRecord {
   std::string material;

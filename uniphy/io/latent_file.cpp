@@ -2,29 +2,14 @@
 
 #include <fmt/format.h>
 
-#include <limits>
-
 #include "ops/kernels/base/error.hpp"
 #include "uniphy/io/hdf5.hpp"
+#include "uniphy/io/material_parameters.hpp"
 
 namespace uniphy {
 namespace {
 
 constexpr const char* kFormat = "uniphy-latent";
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-
-/// The parameters of a description in the order of /parameters.
-std::array<double*, 5> parameter_slots(kernels::LawDescription& d) {
-  return {&d.mu, &d.lambda, &d.tau_y, &d.theta, &d.eta};
-}
-constexpr std::array<const char*, 5> kNames{"mu", "lambda", "tau_y", "theta", "eta"};
-
-bool has_parameter(kernels::LawId id, const std::string& name) {
-  for (const std::string& known : kernels::parameter_names(id)) {
-    if (known == name) return true;
-  }
-  return false;
-}
 
 std::vector<double> to_vector(const std::array<double, 3>& a) { return {a.begin(), a.end()}; }
 
@@ -89,14 +74,8 @@ void write_latent(const std::filesystem::path& file, const LatentFile& latent) {
                  {"1", "distance in units of the spread of the codes"});
     writer.write_strings("nearest/material", material, {"1", "law behind that code"});
   } else {
-    kernels::LawDescription description = latent.analytic;
-    std::vector<double> values;
-    const auto slots = parameter_slots(description);
-    for (std::size_t k = 0; k < slots.size(); ++k) {
-      values.push_back(has_parameter(description.id, kNames[k]) ? *slots[k] : kNone);
-    }
-    writer.write("parameters", values, {5},
-                 {"Pa, Pa, Pa, rad, Pa s", "mu, lambda, tau_y, theta, eta"});
+    const MaterialParameters values = parameters_of(latent.analytic);
+    writer.write("parameters", values.data(), {kernels::kLawParameters}, material_parameter_info());
   }
   writer.write("velocity/centre", to_vector(latent.centre), {3}, {"m", "centre of mass"});
   writer.write("velocity/linear", to_vector(latent.linear), {3}, {"m/s", "its velocity"});
@@ -128,14 +107,13 @@ LatentFile read_latent(const std::filesystem::path& file) {
     } catch (const Error& error) {
       reader.fail("attribute law of /", error.what());
     }
-    const auto values = reader.read<double>("parameters", {5});
-    const auto slots = parameter_slots(latent.analytic);
-    for (std::size_t k = 0; k < slots.size(); ++k) {
-      if (!has_parameter(latent.analytic.id, kNames[k])) continue;
-      if (!(values[k] >= 0)) {
-        reader.fail("/parameters", fmt::format("expected {} >= 0, found {}", kNames[k], values[k]));
+    const auto values = reader.read<double>("parameters", {kernels::kLawParameters});
+    for (const kernels::LawParameter& p : kernels::law_parameters(latent.analytic.id)) {
+      const double value = values[p.place];
+      if (!(value >= 0)) {
+        reader.fail("/parameters", fmt::format("expected {} >= 0, found {}", p.name, value));
       }
-      *slots[k] = values[k];
+      latent.analytic.*p.member = value;
     }
   }
   latent.centre = read_vector3(reader, "velocity/centre");

@@ -106,8 +106,8 @@ void write_model(const std::filesystem::path& file, const ModelFile& model, bool
   for (const auto& row : model.parameters) {
     parameters.insert(parameters.end(), row.begin(), row.end());
   }
-  writer.write("latents/parameters", parameters, {count, 5},
-               {"Pa, Pa, Pa, rad, Pa s", "mu, lambda, tau_y, theta, eta; NaN where there is none"});
+  writer.write("latents/parameters", parameters, {count, kernels::kLawParameters},
+               material_parameter_info());
   writer.commit();
 }
 
@@ -145,10 +145,12 @@ ModelFile read_model(const std::filesystem::path& file) {
   model.materials = reader.read_strings("latents/material");
   const std::int64_t count = model.codes();
   model.latents = reader.read<double>("latents/z", {count, size}, hdf5::Values::finite);
-  const auto parameters = reader.read<double>("latents/parameters", {count, 5});
+  const auto parameters =
+      reader.read<double>("latents/parameters", {count, kernels::kLawParameters});
   model.parameters.resize(static_cast<std::size_t>(count));
   for (std::size_t i = 0; i < model.parameters.size(); ++i) {
-    for (std::size_t k = 0; k < 5; ++k) model.parameters[i][k] = parameters[i * 5 + k];
+    MaterialParameters& row = model.parameters[i];
+    for (std::size_t k = 0; k < row.size(); ++k) row[k] = parameters[i * row.size() + k];
   }
   return model;
 }

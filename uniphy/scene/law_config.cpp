@@ -13,22 +13,8 @@ namespace uniphy {
 using kernels::LawDescription;
 using kernels::LawId;
 
-LawParameterKey law_parameter_key(LawId id, const std::string& name) {
-  if (name == "mu") {
-    if (id == LawId::newtonian) {
-      return {&LawDescription::mu, positive(), "Pa s", "dynamic viscosity"};
-    }
-    return {&LawDescription::mu, positive(), "Pa", "shear modulus"};
-  }
-  if (name == "lambda") {
-    return {&LawDescription::lambda, positive(), "Pa",
-            id == LawId::water ? "bulk modulus" : "first Lame parameter"};
-  }
-  if (name == "tau_y") return {&LawDescription::tau_y, at_least(0), "Pa", "yield stress"};
-  if (name == "theta") {
-    return {&LawDescription::theta, Range{0, M_PI / 2, false, true}, "rad", "friction angle"};
-  }
-  return {&LawDescription::eta, at_least(0), "Pa s", "viscosity of the plastic flow"};
+Range range_of(const kernels::LawParameter& parameter) {
+  return {0, parameter.below, parameter.positive, std::isfinite(parameter.below)};
 }
 
 namespace {
@@ -101,10 +87,9 @@ LawSource read_law(Section& law) {
     const LawId id = static_cast<LawId>(i);
     variants.push_back({kernels::law_name(id), docs[i], [&source, id](Section& s) {
                           source.description.id = id;
-                          for (const std::string& name : kernels::parameter_names(id)) {
-                            const LawParameterKey p = law_parameter_key(id, name);
+                          for (const kernels::LawParameter& p : kernels::law_parameters(id)) {
                             source.description.*p.member =
-                                s.real(name, required, p.range, p.unit, p.doc);
+                                s.real(p.name, required, range_of(p), p.unit, p.text);
                           }
                           if (id == LawId::learned) read_learned(s, &source);
                         }});

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "ops/kernels/laws/law.hpp"
+#include "ops/kernels/laws/law_parameters.hpp"
 #include "uniphy/config/config.hpp"
 
 namespace uniphy {
@@ -31,14 +31,8 @@ struct LawSource {
   kernels::LawDescription load() const;
 };
 
-/// How a parameter of an analytic law (kernels::parameter_names) is read.
-struct LawParameterKey {
-  double kernels::LawDescription::*member;
-  Range range;
-  const char* unit;
-  const char* doc;
-};
-LawParameterKey law_parameter_key(kernels::LawId id, const std::string& name);
+/// The values that a parameter of an analytic law may take.
+Range range_of(const kernels::LawParameter& parameter);
 
 /// Declares and reads the keys of a law: `type` and, beside it, the parameters of that law.
 LawSource read_law(Section& law);

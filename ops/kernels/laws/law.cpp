@@ -1,8 +1,7 @@
 #include "ops/kernels/laws/law.hpp"
 
 #include <array>
-#include <cmath>
-#include <utility>
+#include <string>
 
 #include "ops/kernels/base/error.hpp"
 #include "ops/kernels/laws/analytic_law.hpp"
@@ -11,27 +10,15 @@
 namespace uniphy::kernels {
 namespace {
 
-struct LawInfo {
-  const char* name;
-  std::vector<std::string> parameters;
-};
-
-const LawInfo& info(LawId id) {
-  // In the order of LawId.
-  static const std::array<LawInfo, 8> all{{{"elastic", {"mu", "lambda"}},
-                                           {"newtonian", {"mu", "lambda"}},
-                                           {"plasticine", {"mu", "lambda", "tau_y"}},
-                                           {"sand", {"mu", "lambda", "theta"}},
-                                           {"non_newtonian", {"mu", "lambda", "tau_y", "eta"}},
-                                           {"fixed_corotated", {"mu", "lambda"}},
-                                           {"water", {"lambda"}},
-                                           {"learned", {}}}};
-  return all.at(static_cast<std::size_t>(id));
-}
+// In the order of LawId.
+constexpr std::array<const char*, kAnalyticLaws + 1> kNames{
+    "elastic",       "newtonian",       "plasticine", "sand",
+    "non_newtonian", "fixed_corotated", "water",      "learned"};
+static_assert(static_cast<int>(LawId::learned) == kAnalyticLaws);
 
 }  // namespace
 
-const char* law_name(LawId id) { return info(id).name; }
+const char* law_name(LawId id) { return kNames.at(static_cast<std::size_t>(id)); }
 
 LawId law_id(const std::string& name) {
   std::string known;
@@ -42,8 +29,6 @@ LawId law_id(const std::string& name) {
   }
   throw Error("law: expected one of " + known + "; found \"" + name + "\"");
 }
-
-const std::vector<std::string>& parameter_names(LawId id) { return info(id).parameters; }
 
 template <class T>
 std::shared_ptr<const LawKernel<T>> make_law(const LawDescription& description) {

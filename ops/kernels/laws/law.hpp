@@ -23,7 +23,7 @@ class LawKernel {
   virtual ~LawKernel() = default;
 
   /// Numbers that the law is conditioned on and can be differentiated by: the material parameters
-  /// of an analytic law (in the order of parameter_names(LawId)), the latent z of a learned one.
+  /// of an analytic law (in the order of law_parameters(LawId)), the latent z of a learned one.
   virtual std::ptrdiff_t parameter_size() const = 0;
   /// Length of the running sum that adjoint() adds to.
   virtual std::ptrdiff_t accumulator_size() const = 0;
@@ -69,9 +69,6 @@ struct LawDescription {
 /// names.
 const char* law_name(LawId id);
 LawId law_id(const std::string& name);
-/// The parameters that a law takes, in the order of its gradient: subset of
-/// {"mu", "lambda", "tau_y", "theta", "eta"}; empty for learned.
-const std::vector<std::string>& parameter_names(LawId id);
 
 /// The kernel of a law on the best instruction set of this CPU. Throws Error naming the parameter
 /// where one is missing, not finite or not positive, or where z has the wrong length.

@@ -35,8 +35,8 @@ void add_rows_of(LawId id, Stage stage, Isa isa, std::mt19937_64& random,
                  std::vector<GradientRow>& rows) {
   const std::string op = std::string(kernels::law_name(id)) + " " + stage_name(stage);
   std::string names;
-  for (const std::string& name : kernels::parameter_names(id))
-    names += (names.empty() ? "" : ", ") + name;
+  for (const kernels::LawParameter& p : kernels::law_parameters(id))
+    names += (names.empty() ? "" : ", ") + std::string(p.name);
   GradientRow of_F{op, "F", {}}, of_C{op, "C", {}}, of_parameters{op, names, {}};
   const auto worst = [](double& slot, double value) { slot = std::max(slot, value); };
   for (const DeformationCase& c : cases_of(sample_law(id))) {

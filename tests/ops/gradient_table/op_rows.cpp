@@ -48,7 +48,7 @@ std::vector<GradientRow> op_rows() {
     const std::string op = "50 steps, " + std::string(learned ? "learned law, " : "") + m.name;
     add(op, "initial velocity", errors.velocity);
     for (std::size_t k = 0; k < errors.parameters.size(); ++k) {
-      const std::string name = learned ? "z" : kernels::parameter_names(m.law.id)[k];
+      const std::string name = learned ? "z" : kernels::law_parameters(m.law.id)[k].name;
       // A gradient that is nothing at all must not pass for a right one.
       add(op, name, errors.sizes[k] > 0 ? errors.parameters[k] : INFINITY);
     }

@@ -37,14 +37,8 @@ Reference read_reference(const std::string& material) {
   body.velocity = {number("vx"), number("vy"), number("vz")};
   body.angular_velocity = {number("wx"), number("wy"), number("wz")};
   body.law.id = kernels::law_id(material);
-  const auto optional = [&](const char* name) {
-    return file.has_attribute("/" + material, name) ? number(name) : 0.0;
-  };
-  body.law.mu = number("mu");
-  body.law.lambda = number("lambda");
-  body.law.tau_y = optional("tau_y");
-  body.law.theta = optional("theta");
-  body.law.eta = optional("eta");
+  for (const kernels::LawParameter& p : kernels::law_parameters(body.law.id))
+    body.law.*p.member = number(p.name);
   scene.bodies.push_back(body);
   return reference;
 }

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "ops/kernels/laws/law_parameters.hpp"
 #include "ops/kernels/rollout/rollout.hpp"
 
 namespace uniphy::kernels {
@@ -75,11 +76,7 @@ double largest_difference(const std::string& law) {
   const double volume = size * size * size / double(particles);
   LawDescription description;
   description.id = law_id(law);
-  description.mu = number("mu");
-  description.lambda = number("lambda");
-  description.tau_y = number("tau_y");
-  description.theta = number("theta");
-  description.eta = number("eta");
+  for (const LawParameter& p : kLawParameterTable) description.*p.member = number(p.name);
   const Rollout<T> rollout(grid, {{0, particles, make_law<T>(description)}},
                            std::vector<T>(particles, T(number("rho") * volume)),
                            std::vector<T>(particles, T(volume)));

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <array>
+
+#include "ops/kernels/laws/law_parameters.hpp"
+#include "uniphy/io/hdf5.hpp"
+
+namespace uniphy {
+
+/// The parameters of one material as a row of dataset.h5, model.h5 or latent.h5: in the order and
+/// the units of kernels::kLawParameterTable, NaN where the law has none.
+using MaterialParameters = std::array<double, kernels::kLawParameters>;
+MaterialParameters no_parameters();
+MaterialParameters parameters_of(const kernels::LawDescription& law);
+
+/// The units and the names, for the attributes of such rows.
+hdf5::Info material_parameter_info();
+
+}  // namespace uniphy
