@@ -23,17 +23,12 @@
 #include <string>
 #include <vector>
 
+#include "ops/kernels/mpm/particle_state.hpp"
 #include "uniphy/io/hdf5.hpp"
 
 namespace uniphy {
 
-/// One instant of all particles; arrays are row-major, absent ones empty.
-struct ParticleState {
-  std::vector<double> x;  ///< [particles, 3] m
-  std::vector<double> v;  ///< [particles, 3] m/s
-  std::vector<double> C;  ///< [particles, 3, 3] 1/s
-  std::vector<double> F;  ///< [particles, 3, 3]
-};
+using ParticleState = kernels::ParticleState<double>;
 
 /// What does not change along a trajectory.
 struct TrajectoryHeader {

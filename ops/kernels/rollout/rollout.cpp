@@ -42,19 +42,6 @@ void check_steps(std::ptrdiff_t steps, std::ptrdiff_t every, std::ptrdiff_t leas
 }  // namespace
 
 template <class T>
-ParticleState<T> ParticleState<T>::undeformed(std::vector<T> x, std::vector<T> v) {
-  ParticleState state;
-  state.C.assign(3 * x.size(), T(0));
-  state.F.assign(3 * x.size(), T(0));
-  for (std::size_t k = 0; k < state.F.size(); k += 9) {
-    state.F[k] = state.F[k + 4] = state.F[k + 8] = 1;
-  }
-  state.x = std::move(x);
-  state.v = std::move(v);
-  return state;
-}
-
-template <class T>
 Rollout<T>::Rollout(const GridSettings& grid, std::vector<BodyRange<T>> bodies, std::vector<T> mass,
                     std::vector<T> volume)
     : grid_(grid), bodies_(std::move(bodies)), mass_(std::move(mass)), volume_(std::move(volume)) {
@@ -191,8 +178,6 @@ RolloutGradient<T> Rollout<T>::adjoint(const RolloutTape<T>& tape, const T* grad
   return result;
 }
 
-template struct ParticleState<float>;
-template struct ParticleState<double>;
 template class Rollout<float>;
 template class Rollout<double>;
 

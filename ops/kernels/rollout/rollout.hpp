@@ -7,19 +7,9 @@
 
 #include "ops/kernels/laws/law.hpp"
 #include "ops/kernels/mpm/grid.hpp"
+#include "ops/kernels/mpm/particle_state.hpp"
 
 namespace uniphy::kernels {
-
-/// Particles, row-major and in the user's order: x [P,3] m, v [P,3] m/s, affine velocity C [P,9]
-/// 1/s, deformation gradient F [P,9].
-template <class T>
-struct ParticleState {
-  std::vector<T> x, v, C, F;
-
-  std::ptrdiff_t size() const { return static_cast<std::ptrdiff_t>(x.size() / 3); }
-  /// The state before the first step: F = I, C = 0.
-  static ParticleState undeformed(std::vector<T> x, std::vector<T> v);
-};
 
 /// A body: the particles [begin, end) and the law that they follow.
 template <class T>
