@@ -3,7 +3,7 @@
 #include <cstdio>
 #include <limits>
 
-#include "ops/kernels/spectral/minimum_stretch.hpp"
+#include "ops/kernels/spectral/limits.hpp"
 
 namespace uniphy::models {
 

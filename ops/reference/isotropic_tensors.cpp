@@ -2,6 +2,8 @@
 
 #include <torch/torch.h>
 
+#include "ops/kernels/spectral/limits.hpp"
+
 namespace uniphy::ops::reference {
 
 using torch::Tensor;
@@ -10,29 +12,27 @@ using torch::autograd::variable_list;
 
 namespace {
 
-constexpr double kStretchFloor = 0.05;
-constexpr double kSumFloor = 1e-5;
-
 Tensor rows(const Tensor& v) { return v.unsqueeze(2); }     // [P, 3, 1]: the value of row i
 Tensor columns(const Tensor& v) { return v.unsqueeze(1); }  // [P, 1, 3]: the value of column j
 
-/// 1/(σ_i + σ_j), sign kept, magnitude of the sum at least 1e-5. [P, 3, 3]
+/// 1/(σ_i + σ_j), sign kept, magnitude of the sum at least kLeastSum. [P, 3, 3]
 Tensor inverse_sum(const Tensor& sigma) {
   const Tensor sum = rows(sigma) + columns(sigma);
-  const Tensor magnitude = sum.abs().clamp_min(kSumFloor);
+  const Tensor magnitude = sum.abs().clamp_min(kernels::kLeastSum);
   return 1 / torch::where(sum < 0, -magnitude, magnitude);
 }
 
 /// (ε_i − ε_j)/(σ_i − σ_j) of ε = log max(σ, floor); on the diagonal dε_i/dσ_i. [P, 3, 3]
 Tensor strain_divided_difference(const Tensor& sigma) {
-  const Tensor stretch = sigma.clamp_min(kStretchFloor);
+  const Tensor stretch = sigma.clamp_min(kernels::kMinimumStretch);
   const Tensor a = rows(stretch), b = columns(stretch), gap = a - b;
   const Tensor same = gap == 0, one = torch::ones_like(gap);
   const Tensor of_log =
       torch::where(same, 1 / (b * one), torch::log1p(gap / b) / torch::where(same, one, gap));
   // (stretch_i − stretch_j)/(σ_i − σ_j): 1 above the clamp, 0 below it.
   const Tensor raw = rows(sigma) - columns(sigma);
-  const Tensor above = (rows(sigma) > kStretchFloor) & (columns(sigma) > kStretchFloor);
+  const Tensor above =
+      (rows(sigma) > kernels::kMinimumStretch) & (columns(sigma) > kernels::kMinimumStretch);
   const Tensor ratio =
       torch::where(raw == 0, torch::zeros_like(raw), gap / torch::where(raw == 0, one, raw));
   return of_log * torch::where(above, one, ratio);
@@ -43,7 +43,7 @@ class HenckyFunction : public torch::autograd::Function<HenckyFunction> {
   static Tensor forward(AutogradContext* ctx, const Tensor& F) {
     const SignedSvd s = signed_svd(F.detach());
     ctx->save_for_backward({s.U, s.sigma, s.V});
-    return (s.U * columns(s.sigma.clamp_min(kStretchFloor).log())).matmul(s.U.mT());
+    return (s.U * columns(s.sigma.clamp_min(kernels::kMinimumStretch).log())).matmul(s.U.mT());
   }
 
   static variable_list backward(AutogradContext* ctx, variable_list grad) {

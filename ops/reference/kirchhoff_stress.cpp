@@ -3,6 +3,7 @@
 #include <torch/torch.h>
 
 #include "ops/kernels/base/error.hpp"
+#include "ops/kernels/spectral/limits.hpp"
 #include "ops/reference/svd3.hpp"
 
 namespace uniphy::ops::reference {
@@ -39,7 +40,7 @@ Tensor kirchhoff_stress(LawId law, const Tensor& F, const Tensor& C, const Mater
     case LawId::sand:
     case LawId::non_newtonian: {
       const Svd3 svd = svd3(F);
-      const Tensor strain = svd.sigma.clamp_min(0.05).log();
+      const Tensor strain = svd.sigma.clamp_min(kernels::kMinimumStretch).log();
       const Tensor principal = 2 * mu * strain + lambda * strain.sum(-1, true);
       return torch::matmul(svd.U * principal.unsqueeze(-2), svd.U.transpose(-1, -2));
     }

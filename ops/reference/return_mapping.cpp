@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "ops/kernels/spectral/limits.hpp"
 #include "ops/reference/svd3.hpp"
 
 namespace uniphy::ops::reference {
@@ -26,7 +27,7 @@ Tensor return_mapping(LawId law, const Tensor& F, const Material& m, double dt) 
   const auto number = [&F](const Parameter& p) { return p.tensor().to(F.scalar_type()); };
   const Tensor mu = number(m.mu), lambda = number(m.lambda), tau_y = number(m.tau_y);
   const Svd3 svd = svd3(F);
-  const Tensor stretch = svd.sigma.clamp_min(0.05);
+  const Tensor stretch = svd.sigma.clamp_min(kernels::kMinimumStretch);
   const Tensor strain = stretch.log();
   const Tensor trace = strain.sum(-1, true);
   const Tensor deviator = strain - trace / 3;

@@ -6,7 +6,8 @@ namespace uniphy::kernels {
 inline namespace UNIPHY_ISA {
 
 /// J is clamped here below where a logarithm or a root is taken, so that an inverted F has a
-/// finite stress; the derivative with respect to J is zero below the clamp.
+/// finite stress; the derivative with respect to J is zero below the clamp. Part of the definition
+/// of newtonian (UniPhy, CVPR 2025), kept by the other laws of J.
 inline constexpr double kMinimumJ = 1e-6;
 
 /// max(det F, floor). A determinant that is not finite gives NaN: without the difference, −∞ would

@@ -11,10 +11,11 @@ inline namespace UNIPHY_ISA {
 /// θ in rad; μ, λ in Pa.
 /// G. Klár et al., Drucker–Prager elastoplasticity for sand animation, SIGGRAPH 2016, section 6.3.
 struct DruckerPrager {
+  static constexpr double kRoot = 0.81649658092772603273;  ///< √(2/3)
+
   template <class V>
   static UNIPHY_INLINE V alpha(const Material<V>& m) {
     using T = ScalarOf<V>;
-    constexpr double kRoot = 0.81649658092772603273;  // √(2/3)
     return V(T(2 * kRoot)) * m.sin_theta / (V(T(3)) - m.sin_theta);
   }
 
@@ -48,7 +49,6 @@ struct DruckerPrager {
     strain.trace = strain.trace + select<V>(cone, grad_trace - per_q * beta, zero);
     const V of_beta = -per_q * h.trace;
     const V gap = three - m.sin_theta;
-    constexpr double kRoot = 0.81649658092772603273;  // √(2/3)
     const V alpha_slope = V(T(6 * kRoot)) * m.cos_theta / (gap * gap);
     g.theta = g.theta + of_beta * stiffness * alpha_slope;
     g.lambda = g.lambda + of_beta * a * three / two_mu;

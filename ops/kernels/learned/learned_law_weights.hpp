@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "ops/kernels/spectral/limits.hpp"
+
 namespace uniphy::kernels {
 
 /// Smooth activations. gelu is the exact one, x Φ(x); silu is x / (1 + exp(-x)); squareplus is
@@ -73,7 +75,6 @@ inline constexpr double kInvariantSmoothing = 0.05;  ///< d: rounds the kink of 
 inline constexpr double kSinhLimit = 12;             ///< of outputs whose sinh is a coefficient
 inline constexpr double kLeastViscosity = -0.2;  ///< of sinh(η̃)/b̄: the share is at most 1.25
 inline constexpr double kExponentLimit = 4;  ///< of outputs that are exponents of strain measures
-inline constexpr double kArgumentLimit = 30;  ///< of their |γ x| and |δ x|: float does not overflow
 inline constexpr double kFluidCap = -0.5;  ///< c₁ below which a material has no strength at all
 
 }  // namespace uniphy::kernels

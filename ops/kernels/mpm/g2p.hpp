@@ -33,15 +33,7 @@ void gather(const TransferChunk<T>& chunk, const GridView<const T>& grid, T* mom
       if (i > 0) sum_x = lane_fma(T(i) * wx[i], along_y, sum_x);
       sum_y = lane_fma(wx[i], lane_fma(T(2), part2, part1), sum_y);
     }
-    T out[4][4];
-    sum = sum * wz;
-    sum_nodes(sum, out[0]);
-    sum_nodes(sum_x * wz, out[1]);
-    sum_nodes(sum_y * wz, out[2]);
-    sum_nodes(sum * index, out[3]);
-    for (int b = 0; b < 4; ++b) {
-      for (int c = 0; c < 3; ++c) moments[(3 * b + c) * kChunk + l] = out[b][c];
-    }
+    store_moments<3>(sum, sum_x, sum_y, wz, index, l, moments);
   }
 }
 

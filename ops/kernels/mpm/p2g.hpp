@@ -91,6 +91,22 @@ UNIPHY_INLINE void prefetch_record_after(const T* record) {
   __builtin_prefetch(reinterpret_cast<const char*>(record) + sizeof(TransferChunk<T>));
 }
 
+/// Particle l's planes of `moments` from sums over the rows of its stencil, not yet weighted along
+/// z: Σ w h, then Σ w h i_b for the node offsets i_b (b = x, y, z), `components` numbers of h each.
+template <int components, class T>
+UNIPHY_INLINE void store_moments(NodeRow<T> sum, const NodeRow<T>& sum_x, const NodeRow<T>& sum_y,
+                                 const NodeRow<T>& wz, const NodeRow<T>& index, int l, T* moments) {
+  T out[4][4];
+  sum = sum * wz;
+  sum_nodes(sum, out[0]);
+  sum_nodes(sum_x * wz, out[1]);
+  sum_nodes(sum_y * wz, out[2]);
+  sum_nodes(sum * index, out[3]);
+  for (int b = 0; b < 4; ++b) {
+    for (int c = 0; c < components; ++c) moments[(components * b + c) * kChunk + l] = out[b][c];
+  }
+}
+
 /// Adds the chunk to the layers [layer_begin, layer_end) of the grid.
 template <class T>
 void scatter(const TransferChunk<T>& chunk, const GridView<T>& grid, int layer_begin,

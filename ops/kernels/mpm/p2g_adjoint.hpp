@@ -55,16 +55,7 @@ void gather_adjoint(const TransferChunk<T>& chunk, const GridView<const T>& grid
     moments[16 * kChunk + l] = sum_all(work_x * wz);
     moments[17 * kChunk + l] = sum_all(work_y * wz);
     moments[18 * kChunk + l] = sum_all(work * slope_z);
-    if (slopes_only) continue;
-    T out[4][4];
-    sum = sum * wz;
-    sum_nodes(sum, out[0]);
-    sum_nodes(sum_x * wz, out[1]);
-    sum_nodes(sum_y * wz, out[2]);
-    sum_nodes(sum * index, out[3]);
-    for (int b = 0; b < 4; ++b) {
-      for (int c = 0; c < 4; ++c) moments[(4 * b + c) * kChunk + l] = out[b][c];
-    }
+    if (!slopes_only) store_moments<4>(sum, sum_x, sum_y, wz, index, l, moments);
   }
 }
 

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 
 #include "ops/kernels/laws/law.hpp"
+#include "ops/kernels/simd/prefetch.hpp"
 
 namespace uniphy::kernels {
 
@@ -36,5 +38,12 @@ struct TransferChunk {
   std::int32_t count;                     ///< particles, at most kChunk
   std::int32_t bad;                       ///< first lane whose stencil leaves the grid, or −1
 };
+
+/// Asks for the offsets and base nodes; the records are asked for where the particles are walked
+/// over (p2g.hpp).
+template <class T>
+void prefetch_stencil(const TransferChunk<T>& chunk) {
+  prefetch(chunk.f, sizeof(chunk) - offsetof(TransferChunk<T>, f));
+}
 
 }  // namespace uniphy::kernels

@@ -15,7 +15,8 @@ struct Item {
   std::int32_t particle;
 };
 
-/// Stable sort by key, 11 bits at a time.
+/// Stable sort by key, 11 bits at a time: the 2048 counters of a pass stay in the first-level
+/// cache, and two passes serve grids of up to 161 nodes a side.
 void radix_sort(std::vector<Item>& items, std::vector<Item>& spare, std::uint64_t largest_key) {
   constexpr int kBits = 11;
   spare.resize(items.size());

@@ -14,7 +14,8 @@
 namespace uniphy::kernels {
 namespace {
 
-/// Layers are handed to threads in this many contiguous parts.
+/// Layers are handed to threads in this many contiguous parts of about equal work. The bits of a
+/// sum do not depend on it (p2g.hpp); no more threads than this take part.
 constexpr int kLayerParts = 16;
 
 /// The particles of one call in chunks, with their stencils, and a grid with the rows padded as the

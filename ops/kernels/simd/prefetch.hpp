@@ -2,8 +2,6 @@
 
 #include <cstddef>
 
-#include "ops/kernels/mpm/particle_chunk.hpp"
-
 namespace uniphy::kernels {
 
 /// Asks for memory that will be needed soon. Chunks are longer than the hardware prefetchers look
@@ -14,12 +12,6 @@ inline void prefetch(const void* from, std::size_t bytes) {
   for (std::size_t i = 0; i < bytes; i += 64) {
     __builtin_prefetch(static_cast<const char*>(from) + i, 1, 2);
   }
-}
-
-/// Offsets and base nodes; the records are asked for where the particles are walked over (p2g.hpp).
-template <class T>
-void prefetch_stencil(const TransferChunk<T>& chunk) {
-  prefetch(chunk.f, sizeof(chunk) - offsetof(TransferChunk<T>, f));
 }
 
 }  // namespace uniphy::kernels

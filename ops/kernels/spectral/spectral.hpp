@@ -1,6 +1,6 @@
 #pragma once
 
-#include "ops/kernels/spectral/minimum_stretch.hpp"
+#include "ops/kernels/spectral/limits.hpp"
 #include "ops/kernels/spectral/svd3.hpp"
 
 // Isotropic functions of F and their adjoints by divided differences.
@@ -21,12 +21,11 @@ inline namespace UNIPHY_ISA {
 
 inline constexpr int kPair[3][2] = {{0, 1}, {0, 2}, {1, 2}};
 
-/// 1/(σi + σj), the sum bounded away from zero by 1e-5: two singular values that small at once, or
-/// σ3 = −σ2 of an inverted F, where the rotation jumps.
+/// 1/(σi + σj), the sum bounded away from zero by kLeastSum.
 template <class V>
 UNIPHY_INLINE V inverse_sum(const V& a, const V& b) {
   using T = ScalarOf<V>;
-  const V floor(T(1e-5));
+  const V floor = V(T(kLeastSum));
   const V s = a + b;
   const V magnitude = lane_max(floor, lane_abs(s));
   return V(T(1)) / select<V>(s < V(T(0)), -magnitude, magnitude);
@@ -57,6 +56,7 @@ template <class V>
 UNIPHY_INLINE V exp_divided_difference(const V& a, const V& b, const V& exp_a, const V& exp_b) {
   using T = ScalarOf<V>;
   const V one(T(1));
+  // Six terms of sinhc reach 1e-17 at |h| = 1/4.
   const V d = a - b, h = d * V(T(0.5)), h2 = h * h;
   V series(T(1.0 / 39916800));
   series = lane_fma(series, h2, V(T(1.0 / 362880)));

@@ -1,6 +1,5 @@
 #pragma once
 
-#include "ops/kernels/learned/learned_law_weights.hpp"
 #include "ops/kernels/spectral/spectral.hpp"
 
 // Strain measures between Hencky's and the others, one smooth family:
