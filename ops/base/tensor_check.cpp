@@ -17,6 +17,11 @@ std::string describe(const Tensor& t) {
   return s.str();
 }
 
+void refuse(const char* op, const char* name, const std::string& expected, const Tensor& found) {
+  throw Error(std::string(op) + ": " + name + ": expected " + expected + ", found " +
+              describe(found));
+}
+
 void check_tensor(const char* op, const char* name, const Tensor& t, torch::ScalarType dtype,
                   const std::vector<std::int64_t>& sizes) {
   bool fits = t.defined() && t.device().is_cpu() && t.scalar_type() == dtype &&
@@ -26,7 +31,7 @@ void check_tensor(const char* op, const char* name, const Tensor& t, torch::Scal
   }
   if (fits) return;
   std::ostringstream s;
-  s << op << ": " << name << ": expected [";
+  s << "[";
   for (std::size_t i = 0; i < sizes.size(); ++i) {
     if (i > 0) s << ", ";
     if (sizes[i] == kAnySize) {
@@ -35,8 +40,8 @@ void check_tensor(const char* op, const char* name, const Tensor& t, torch::Scal
       s << sizes[i];
     }
   }
-  s << "] " << dtype << " on cpu, found " << describe(t);
-  throw Error(s.str());
+  s << "] " << dtype << " on cpu";
+  refuse(op, name, s.str(), t);
 }
 
 Tensor checked(const char* op, const char* name, const Tensor& t, torch::ScalarType dtype,
@@ -49,8 +54,7 @@ torch::ScalarType real_type(const char* op, const char* name, const Tensor& t) {
   if (t.defined() && (t.scalar_type() == torch::kFloat32 || t.scalar_type() == torch::kFloat64)) {
     return t.scalar_type();
   }
-  throw Error(std::string(op) + ": " + name + ": expected a Float or Double tensor, found " +
-              describe(t));
+  refuse(op, name, "a Float or Double tensor", t);
 }
 
 }  // namespace uniphy::ops

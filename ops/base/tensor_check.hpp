@@ -10,6 +10,10 @@ namespace uniphy::ops {
 /// Sizes, dtype and device, for messages.
 std::string describe(const torch::Tensor& t);
 
+/// Throws Error: the op, the argument, what was expected, and `found`.
+[[noreturn]] void refuse(const char* op, const char* name, const std::string& expected,
+                         const torch::Tensor& found);
+
 /// A size that may be anything.
 inline constexpr std::int64_t kAnySize = -1;
 

@@ -3,6 +3,7 @@
 #include <torch/torch.h>
 
 #include "ops/base/once_differentiable.hpp"
+#include "ops/base/tensor_check.hpp"
 
 namespace uniphy::ops {
 
@@ -48,10 +49,8 @@ class KirchhoffStressFunction : public torch::autograd::Function<KirchhoffStress
                         const Tensor& packed, int64_t law) {
     const Tensor f = F.contiguous(), c = C.contiguous();
     const Tensor tau = torch::empty_like(f);
-    if (f.scalar_type() == torch::kFloat64)
-      forward_kernel<double>(int(law), f, c, packed, tau);
-    else
-      forward_kernel<float>(int(law), f, c, packed, tau);
+    for_real_type(f.scalar_type(),
+                  [&](auto real) { forward_kernel<decltype(real)>(int(law), f, c, packed, tau); });
     ctx->save_for_backward({f, c, packed});
     ctx->saved_data["law"] = law;
     ctx->set_materialize_grads(false);
@@ -68,10 +67,11 @@ class KirchhoffStressFunction : public torch::autograd::Function<KirchhoffStress
     if (ctx->needs_input_grad(0)) grad_F = torch::empty_like(F);
     if (ctx->needs_input_grad(1)) grad_C = torch::zeros_like(C);  // the kernel adds to it
     const bool parameters_too = ctx->needs_input_grad(2);
-    const Tensor grad_packed =
-        F.scalar_type() == torch::kFloat64
-            ? backward_kernel<double>(law, F, C, saved[2], g, grad_F, grad_C, parameters_too)
-            : backward_kernel<float>(law, F, C, saved[2], g, grad_F, grad_C, parameters_too);
+    Tensor grad_packed;
+    for_real_type(F.scalar_type(), [&](auto real) {
+      grad_packed =
+          backward_kernel<decltype(real)>(law, F, C, saved[2], g, grad_F, grad_C, parameters_too);
+    });
     return once_differentiable("kirchhoff_stress", {grad_F, grad_C, grad_packed, Tensor()});
   }
 };

@@ -14,16 +14,6 @@ namespace uniphy::ops {
 
 using torch::Tensor;
 
-namespace {
-
-[[noreturn]] void fail(const char* op, const char* name, const std::string& expected,
-                       const Tensor& found) {
-  throw Error(std::string(op) + ": " + name + ": expected " + expected + ", found " +
-              describe(found));
-}
-
-}  // namespace
-
 Parameter::Parameter(double value) : tensor_(torch::scalar_tensor(value, torch::kFloat64)) {}
 Parameter::Parameter(Tensor tensor) : tensor_(std::move(tensor)) {}
 
@@ -35,7 +25,7 @@ Tensor pack_material(const char* op, kernels::LawId law, const Material& m) {
   for (const kernels::LawParameter& p : kernels::kLawParameterTable) {
     const Tensor& t = all[p.place]->tensor();
     if (!t.defined() || t.numel() != 1 || !t.is_floating_point() || !t.device().is_cpu())
-      fail(op, p.name, "one Float or Double number on cpu", t);
+      refuse(op, p.name, "one Float or Double number on cpu", t);
     entries.push_back(t.to(torch::kFloat64).reshape({}));
   }
   const Tensor packed = torch::stack(entries);
@@ -59,18 +49,5 @@ kernels::LawParameters<T> law_parameters(const Tensor& packed) {
 }
 template kernels::LawParameters<float> law_parameters<float>(const Tensor&);
 template kernels::LawParameters<double> law_parameters<double>(const Tensor&);
-
-void check_matrices(const char* op, const char* name, const Tensor& t) {
-  if (!t.defined() || !t.device().is_cpu() || t.dim() != 3 || t.size(1) != 3 || t.size(2) != 3 ||
-      (t.scalar_type() != torch::kFloat32 && t.scalar_type() != torch::kFloat64))
-    fail(op, name, "[P, 3, 3] Float or Double on cpu", t);
-}
-
-void check_like(const char* op, const char* name, const Tensor& t, const Tensor& F) {
-  if (t.defined() && t.device().is_cpu() && t.sizes() == F.sizes() &&
-      t.scalar_type() == F.scalar_type())
-    return;
-  fail(op, name, describe(F), t);
-}
 
 }  // namespace uniphy::ops

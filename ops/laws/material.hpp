@@ -4,10 +4,11 @@
 
 #include <vector>
 
+#include "ops/base/matrices.hpp"
 #include "ops/kernels/laws/law.hpp"
 #include "ops/kernels/laws/law_table.hpp"
 
-// What the ops of the analytic laws share: the material as tensors, and the checks of arguments.
+// What the ops of the analytic laws share: the material as tensors.
 
 namespace uniphy::ops {
 
@@ -35,46 +36,17 @@ struct Material {
 };
 
 /// All parameters in the order of kernels::kLawParameterTable as one float64 tensor [5];
-/// differentiable. `op` opens the message
-/// of the Error where a tensor is not a single floating-point number on the CPU or where the law
-/// cannot have the value.
+/// differentiable. `op` opens the message of the Error where a tensor is not a single
+/// floating-point number on the CPU or where the law cannot have the value.
 torch::Tensor pack_material(const char* op, kernels::LawId law, const Material& material);
 
 /// The same numbers for the kernels.
 template <class T>
 kernels::LawParameters<T> law_parameters(const torch::Tensor& packed);
 
-/// Throws Error unless t is [P, 3, 3], float32 or float64, on the CPU.
-void check_matrices(const char* op, const char* name, const torch::Tensor& t);
-/// Throws Error unless t has the shape and the dtype of F.
-void check_like(const char* op, const char* name, const torch::Tensor& t, const torch::Tensor& F);
-
-/// Tensors [P, 3, 3] as views; an undefined tensor is an absent view.
-template <class T>
-kernels::View<const T> matrix_view(const torch::Tensor& t) {
-  return {t.defined() ? t.data_ptr<T>() : nullptr, 9, 1};
-}
-template <class T>
-kernels::View<T> mutable_matrix_view(const torch::Tensor& t) {
-  return {t.defined() ? t.data_ptr<T>() : nullptr, 9, 1};
-}
-
-/// Particles that one thread takes at a time: fixed, so that sums over particles have one order
-/// whatever the number of threads.
-inline constexpr std::ptrdiff_t kParticleBlock = 1024;
-
-/// body(first, count) over blocks of particles, in parallel.
-template <class Body>
-void for_each_block(std::ptrdiff_t particles, const Body& body) {
-#pragma omp parallel for schedule(static)
-  for (std::ptrdiff_t p = 0; p < particles; p += kParticleBlock) {
-    body(p, particles - p < kParticleBlock ? particles - p : kParticleBlock);
-  }
-}
-
-/// The same with a LawParameters<T>* for each block to add its share of the gradient to; their sum
-/// in order of blocks, as a tensor like `packed`. Where no gradient is wanted, the pointer is null
-/// and the result undefined.
+/// for_each_block with a LawParameters<T>* for each block to add its share of the gradient to;
+/// their sum in order of blocks, as a tensor like `packed`. Where no gradient is wanted, the
+/// pointer is null and the result undefined.
 template <class T, class Body>
 torch::Tensor sum_over_blocks(std::ptrdiff_t particles, const torch::Tensor& packed, bool wanted,
                               const Body& body) {

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "ops/base/once_differentiable.hpp"
+#include "ops/base/tensor_check.hpp"
 #include "ops/kernels/base/error.hpp"
 
 namespace uniphy::ops {
@@ -50,10 +51,9 @@ class ReturnMappingFunction : public torch::autograd::Function<ReturnMappingFunc
                         double dt) {
     const Tensor f = F.contiguous();
     const Tensor F_proj = torch::empty_like(f);
-    if (f.scalar_type() == torch::kFloat64)
-      forward_kernel<double>(int(law), f, packed, dt, F_proj);
-    else
-      forward_kernel<float>(int(law), f, packed, dt, F_proj);
+    for_real_type(f.scalar_type(), [&](auto real) {
+      forward_kernel<decltype(real)>(int(law), f, packed, dt, F_proj);
+    });
     ctx->save_for_backward({f, packed});
     ctx->saved_data["law"] = law;
     ctx->saved_data["dt"] = dt;
@@ -71,10 +71,11 @@ class ReturnMappingFunction : public torch::autograd::Function<ReturnMappingFunc
     Tensor grad_F;
     if (ctx->needs_input_grad(0)) grad_F = torch::empty_like(F);
     const bool parameters_too = ctx->needs_input_grad(1);
-    const Tensor grad_packed =
-        F.scalar_type() == torch::kFloat64
-            ? backward_kernel<double>(law, F, saved[1], dt, g, grad_F, parameters_too)
-            : backward_kernel<float>(law, F, saved[1], dt, g, grad_F, parameters_too);
+    Tensor grad_packed;
+    for_real_type(F.scalar_type(), [&](auto real) {
+      grad_packed =
+          backward_kernel<decltype(real)>(law, F, saved[1], dt, g, grad_F, parameters_too);
+    });
     return once_differentiable("return_mapping", {grad_F, grad_packed, Tensor(), Tensor()});
   }
 };

@@ -2,9 +2,10 @@
 
 #include <torch/torch.h>
 
+#include "ops/base/matrices.hpp"
 #include "ops/base/once_differentiable.hpp"
+#include "ops/base/tensor_check.hpp"
 #include "ops/kernels/laws/law_table.hpp"
-#include "ops/laws/material.hpp"
 
 namespace uniphy::ops {
 
@@ -51,10 +52,8 @@ class Svd3Function : public torch::autograd::Function<Svd3Function> {
     const Tensor f = F.contiguous();
     const Tensor U = torch::empty_like(f), Vh = torch::empty_like(f);
     const Tensor sigma = torch::empty({f.size(0), 3}, f.options());
-    if (f.scalar_type() == torch::kFloat64)
-      forward_kernel<double>(f, U, sigma, Vh);
-    else
-      forward_kernel<float>(f, U, sigma, Vh);
+    for_real_type(f.scalar_type(),
+                  [&](auto real) { forward_kernel<decltype(real)>(f, U, sigma, Vh); });
     ctx->save_for_backward({U, sigma, Vh});
     ctx->set_materialize_grads(false);
     return {U, sigma, Vh};
@@ -68,10 +67,10 @@ class Svd3Function : public torch::autograd::Function<Svd3Function> {
     if (!any || !ctx->needs_input_grad(0)) return {Tensor()};
     const auto saved = ctx->get_saved_variables();
     const Tensor grad_F = torch::empty_like(saved[0]);
-    if (grad_F.scalar_type() == torch::kFloat64)
-      backward_kernel<double>(saved[0], saved[1], saved[2], grad[0], grad[1], grad[2], grad_F);
-    else
-      backward_kernel<float>(saved[0], saved[1], saved[2], grad[0], grad[1], grad[2], grad_F);
+    for_real_type(grad_F.scalar_type(), [&](auto real) {
+      backward_kernel<decltype(real)>(saved[0], saved[1], saved[2], grad[0], grad[1], grad[2],
+                                      grad_F);
+    });
     return once_differentiable("svd3", {grad_F});
   }
 };
