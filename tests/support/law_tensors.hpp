@@ -4,7 +4,9 @@
 
 #include <array>
 
+#include "ops/kernels/laws/law_parameters.hpp"
 #include "ops/laws/material.hpp"
+#include "tests/support/on_threads.hpp"
 #include "tests/support/tensors.hpp"
 
 namespace uniphy::testing {
@@ -14,9 +16,8 @@ struct MaterialLeaves {
   std::array<torch::Tensor, 5> leaves;
 
   explicit MaterialLeaves(const kernels::LawDescription& d) {
-    const double values[] = {d.mu, d.lambda, d.tau_y, d.theta, d.eta};
-    for (int i = 0; i < 5; ++i)
-      leaves[i] = torch::scalar_tensor(values[i], torch::kFloat64).set_requires_grad(true);
+    for (const kernels::LawParameter& p : kernels::kLawParameterTable)
+      leaves[p.place] = torch::scalar_tensor(d.*p.member, torch::kFloat64).set_requires_grad(true);
   }
   ops::Material material() const { return {leaves[0], leaves[1], leaves[2], leaves[3], leaves[4]}; }
   /// dL/d(log parameter), so that pascals and radians compare; 0 where undefined.
@@ -29,6 +30,41 @@ struct MaterialLeaves {
     return torch::tensor(all, torch::kFloat64);
   }
 };
+
+/// The gradient of (op(F) W).sum() by F against central differences, at states where torch's own
+/// SVD gives NaN too. `floor` is a norm of gradients that is small for the op.
+template <class Op>
+void expect_gradient_by_differences(const kernels::LawDescription& d, double floor, const Op& op) {
+  for (const DeformationCase& c : cases_of(d)) {
+    const torch::Tensor F = to_tensor({c.F}).set_requires_grad(true);
+    const torch::Tensor W = torch::randn_like(F);
+    const auto loss = [&](const torch::Tensor& f) { return (op(f) * W).sum(); };
+    loss(F).backward();
+    const torch::Tensor differences = numerical_gradient(loss, F, c.step);
+    EXPECT_LE((F.grad() - differences).norm().item<double>(),
+              1e-6 * std::max(differences.norm().item<double>(), floor))
+        << c.group;
+  }
+}
+
+/// op(F, material) and its gradients by both have the same bits on one thread and on two.
+template <class Op>
+void expect_same_bits_on_threads(const kernels::LawDescription& d, const Op& op) {
+  const torch::Tensor F =
+      (torch::eye(3) + 0.2 * torch::randn({5000, 3, 3})).set_requires_grad(true);
+  const torch::Tensor W = torch::randn_like(F);
+  const auto run = [&] {
+    const MaterialLeaves leaves(d);
+    const torch::Tensor result = op(F, leaves.material());
+    const torch::Tensor loss = (result * W).sum();
+    return std::vector<torch::Tensor>{
+        result.detach(), torch::autograd::grad({loss}, {F}, {}, true)[0], leaves.gradient(loss)};
+  };
+  const auto one = on_threads(1, run), two = on_threads(2, run);
+  for (std::size_t i = 0; i < one.size(); ++i) {
+    EXPECT_TRUE(torch::equal(one[i], two[i])) << i;
+  }
+}
 
 inline ops::Material numbers(const kernels::LawDescription& d) {
   return {d.mu, d.lambda, d.tau_y, d.theta, d.eta};

@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "ops/kernels/base/error.hpp"
 #include "tests/support/finite_differences.hpp"
 #include "tests/support/law_cases.hpp"
 
@@ -37,6 +36,14 @@ inline double relative_difference(const torch::Tensor& a, const torch::Tensor& b
   return (a - b).abs().max().item<double>() / (size > 0 ? size : 1);
 }
 
+/// What the backward pass of the op that made `result` answers to these gradients of its results;
+/// one for each tensor that the op was given.
+inline torch::autograd::variable_list answer_of_backward(const torch::Tensor& result,
+                                                         torch::autograd::variable_list gradients) {
+  const torch::NoGradGuard guard;
+  return (*result.grad_fn())(std::move(gradients));
+}
+
 /// The gradient of the scalar f at x by central differences, as a tensor like x.
 template <class Function>
 torch::Tensor numerical_gradient(const Function& f, const torch::Tensor& x, double step) {
@@ -49,17 +56,6 @@ torch::Tensor numerical_gradient(const Function& f, const torch::Tensor& x, doub
   const std::vector<double> g =
       central_differences(value, start, std::vector<double>(start.size(), step));
   return torch::tensor(g, torch::kFloat64).view(x.sizes());
-}
-
-/// The message of the Error that f throws; empty where it throws none.
-template <class Function>
-std::string error_message(const Function& f) {
-  try {
-    f();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return {};
 }
 
 }  // namespace uniphy::testing

@@ -8,6 +8,7 @@
 
 #include "ops/base/plain_tensors.hpp"
 #include "ops/reference/law_losses.hpp"
+#include "tests/support/error_of.hpp"
 #include "tests/support/law_loss_tensors.hpp"
 
 namespace uniphy::ops {
@@ -120,7 +121,7 @@ TEST(LawLosses, RefusesWhatDoesNotFit) {
   const auto message = [](const auto& change) {
     Inputs in(testing::law_loss_case(4, 7, true, true), torch::kFloat32);
     change(in);
-    return testing::error_message([&] { in.errors(); });
+    return testing::error_of([&] { in.errors(); });
   };
   const auto expect = [&](const auto& change, const std::string& part) {
     EXPECT_NE(message(change).find(part), std::string::npos) << message(change);

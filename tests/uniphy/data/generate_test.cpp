@@ -2,11 +2,11 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <omp.h>
 
 #include <algorithm>
 #include <cmath>
 
+#include "tests/support/on_threads.hpp"
 #include "tests/uniphy/support/scratch.hpp"
 #include "uniphy/data/dataset_setup.hpp"
 #include "uniphy/data/law_branches.hpp"
@@ -32,15 +32,7 @@ constexpr const char* kSmall =
 
 std::string generate(const GenerateOptions& options, const std::filesystem::path& file, int threads,
                      Metrics& metrics) {
-  const int before = omp_get_max_threads();
-  omp_set_num_threads(threads);
-  try {
-    generate_dataset(options, kSmall, file, metrics);
-  } catch (...) {
-    omp_set_num_threads(before);
-    throw;
-  }
-  omp_set_num_threads(before);
+  testing::on_threads(threads, [&] { generate_dataset(options, kSmall, file, metrics); });
   return read_text_file(file);
 }
 

@@ -56,13 +56,6 @@ TEST(MaterialRanges, LatinHypercubeHasOnePointInEachPart) {
   EXPECT_LT(diagonal, 8);
 }
 
-TEST(MaterialRanges, ParametersOfALawLeaveOutWhatItHasNot) {
-  const auto parameters = parameters_of(material_at(default_material_ranges()[2], all(0.3)));
-  EXPECT_FALSE(std::isnan(parameters[2]));
-  EXPECT_TRUE(std::isnan(parameters[3]));
-  EXPECT_TRUE(std::isnan(parameters[4]));
-}
-
 // The yield surface that steers motions and sampling is the one of the kernels.
 TEST(MaterialRanges, YieldNormIsWhereTheKernelYields) {
   UniformRandom random(11);

@@ -2,11 +2,11 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <omp.h>
 
 #include <cmath>
 
 #include "ops/kernels/base/error.hpp"
+#include "tests/support/on_threads.hpp"
 #include "tests/support/random_weights.hpp"
 #include "tests/uniphy/evaluation/small_run.hpp"
 #include "uniphy/data/generate.hpp"
@@ -70,12 +70,8 @@ TEST(RolloutError, SameBitsOnOneThreadAndTwo) {
   const auto all = setups();
   auto laws = own_laws(all);
   for (kernels::LawDescription& law : laws) law.lambda *= 1.1;
-  const int before = omp_get_max_threads();
-  omp_set_num_threads(1);
-  const auto one = rollout_errors(all, laws);
-  omp_set_num_threads(2);
-  const auto two = rollout_errors(all, laws);
-  omp_set_num_threads(before);
+  const auto errors = [&] { return rollout_errors(all, laws); };
+  const auto one = testing::on_threads(1, errors), two = testing::on_threads(2, errors);
   for (std::size_t i = 0; i < one.size(); ++i) {
     EXPECT_GT(one[i].root_over_size, 0);
     EXPECT_EQ(one[i].root_over_size, two[i].root_over_size);

@@ -1,9 +1,8 @@
 #pragma once
 
-#include <omp.h>
-
 #include <string>
 
+#include "tests/support/on_threads.hpp"
 #include "tests/uniphy/inference/observed_scene.hpp"
 #include "tests/uniphy/support/scratch.hpp"
 #include "uniphy/data/generate_options.hpp"
@@ -38,18 +37,12 @@ inline Metrics run_stage(const DeclareFunction& declare, const std::string& yaml
   const RunFunction work = declare(root);
   config.finish();
   make_directory(directory);
-  const int before = omp_get_max_threads();
-  omp_set_num_threads(threads);
-  RunDirectory out(directory, config.resolved(), threads);
-  Metrics metrics;
-  try {
+  return on_threads(threads, [&] {
+    RunDirectory out(directory, config.resolved(), threads);
+    Metrics metrics;
     work(out, metrics);
-  } catch (...) {
-    omp_set_num_threads(before);
-    throw;
-  }
-  omp_set_num_threads(before);
-  return metrics;
+    return metrics;
+  });
 }
 
 }  // namespace uniphy::testing

@@ -7,7 +7,7 @@
 #include <fstream>
 #include <string>
 
-#include "ops/kernels/base/error.hpp"
+#include "tests/support/error_of.hpp"
 
 namespace uniphy::testing {
 
@@ -43,29 +43,5 @@ class Scratch {
  private:
   std::filesystem::path path_;
 };
-
-/// The message of the uniphy::Error that `function` throws. Anything else fails the test.
-template <class Function>
-std::string error_of(const Function& function) {
-  try {
-    function();
-  } catch (const Error& error) {
-    return error.what();
-  } catch (const std::exception& error) {
-    ADD_FAILURE() << "expected uniphy::Error, found another exception: " << error.what();
-    return "";
-  }
-  ADD_FAILURE() << "expected uniphy::Error, found none";
-  return "";
-}
-
-/// The directory is taken out of a message, so that it can be compared as a whole.
-inline std::string without_directory(std::string message, const std::filesystem::path& directory) {
-  const std::string prefix = directory.string() + "/";
-  for (std::size_t at; (at = message.find(prefix)) != std::string::npos;) {
-    message.erase(at, prefix.size());
-  }
-  return message;
-}
 
 }  // namespace uniphy::testing

@@ -1,12 +1,14 @@
 // The analytic laws: independent numbers, gradients, invariants, instruction sets, the interface.
 // The plastic ones in detail: return_mapping_test.cpp.
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <numeric>
 #include <string>
 
-#include "ops/kernels/base/error.hpp"
+#include "ops/kernels/laws/analytic_law.hpp"
+#include "tests/support/error_of.hpp"
 #include "tests/support/law_gradients.hpp"
 #include "tests/support/law_invariants.hpp"
 #include "tests/support/reference_laws.hpp"
@@ -17,6 +19,8 @@ namespace {
 using kernels::Isa;
 using kernels::LawDescription;
 using kernels::LawId;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
 
 std::string isa_suffix(Isa isa) { return kernels::isa_name(isa); }
 
@@ -42,9 +46,18 @@ LawPromises promises_of(LawId id) {
   return p;
 }
 
-TEST_P(LawsOnIsa, AgreeWithIndependentNumbers) {
-  if (id() == LawId::fixed_corotated || id() == LawId::water) GTEST_SKIP() << "none exist";
+// fixed_corotated and water, of which there are none, have their formulas below.
+class LawsWithNumbers : public LawsOnIsa {};
+INSTANTIATE_TEST_SUITE_P(All, LawsWithNumbers,
+                         ::testing::Combine(::testing::Values(LawId::elastic, LawId::newtonian,
+                                                              LawId::plasticine, LawId::sand,
+                                                              LawId::non_newtonian),
+                                            ::testing::ValuesIn(kernels::available_isas())),
+                         law_and_isa);
+
+TEST_P(LawsWithNumbers, AgreeWithIndependentNumbers) {
   const ReferenceLaw reference = read_reference_law(kernels::law_name(id()));
+  ASSERT_GT(reference.size(), 0);
   const auto law = kernels::make_analytic_law<double>(reference.description, isa());
   std::vector<double> projected(reference.F.size()), tau(reference.F.size());
   law->evaluate(reference.size(), reference.dt, {reference.F.data(), 9, 1},
@@ -52,8 +65,8 @@ TEST_P(LawsOnIsa, AgreeWithIndependentNumbers) {
   double scale = 0;
   for (const double x : reference.tau) scale = std::max(scale, std::abs(x));
   for (std::size_t i = 0; i < tau.size(); ++i) {
-    EXPECT_NEAR(projected[i], reference.F_proj[i], 1e-13) << i;
-    EXPECT_NEAR(tau[i], reference.tau[i], 1e-12 * scale) << i;
+    EXPECT_NEAR(projected[i], reference.F_proj[i], 2e-14) << i;
+    EXPECT_NEAR(tau[i], reference.tau[i], 1e-13 * scale) << i;
   }
 }
 
@@ -82,8 +95,8 @@ TEST_P(LawsOnIsa, FloatFollowsDouble) {
     const Matrix C = random_matrix(random);
     const LawState a = apply_law(*single, 1e-4, rounded, C);
     const LawState b = apply_law(*precise, 1e-4, rounded, C);
-    EXPECT_LE(norm(a.F_proj - b.F_proj), 2e-5);
-    EXPECT_LE(norm(a.tau - b.tau), 2e-5 * std::max(norm(b.tau), 1e6));
+    EXPECT_LE(norm(a.F_proj - b.F_proj), 5e-6);
+    EXPECT_LE(norm(a.tau - b.tau), 5e-6 * std::max(norm(b.tau), 1e6));
   }
 }
 
@@ -99,8 +112,8 @@ TEST_P(LawsOnIsa, FusedPathIsProjectionThenStress) {
     entry.evaluate(1, parameters, 1e-4, {c.F.data(), 9, 1}, {C.data(), 9, 1},
                    {fused_projected.data(), 9, 1}, {fused_tau.data(), 9, 1});
     // To rounding only: the compiler fuses multiplications and additions differently in each.
-    EXPECT_LE(norm(fused_projected - projected), 1e-14 * norm(c.F)) << c.group;
-    EXPECT_LE(norm(fused_tau - tau), 1e-12 * std::max(norm(tau), 1e5)) << c.group;
+    EXPECT_LE(norm(fused_projected - projected), 2e-15 * norm(c.F)) << c.group;
+    EXPECT_LE(norm(fused_tau - tau), 1e-13 * std::max(norm(tau), 1e5)) << c.group;
   }
 }
 
@@ -114,7 +127,7 @@ TEST_P(LawsOnIsa, GradientsMatchCentralDifferences) {
       const auto where = std::string(stage_name(stage)) + ", " + c.group +
                          ", sigma = " + ::testing::PrintToString(c.sigma);
       EXPECT_LE(e.F, 1e-6) << where;
-      EXPECT_LE(e.C, 1e-6) << where;
+      EXPECT_LE(e.C, 1e-8) << where;
       EXPECT_LE(e.parameters, 1e-6) << where;
     }
   }
@@ -151,8 +164,8 @@ TEST_P(LawsOnIsa, AgreeAcrossInstructionSets) {
     const Matrix C = random_matrix(random), gP = random_matrix(random);
     const Matrix gt = random_matrix(random, 1e-5);
     const LawState a = apply_law(*here, 1e-4, F, C), b = apply_law(*baseline, 1e-4, F, C);
-    EXPECT_LE(norm(a.F_proj - b.F_proj), 1e-13);
-    EXPECT_LE(norm(a.tau - b.tau), 1e-12 * std::max(norm(b.tau), 1e5));
+    EXPECT_LE(norm(a.F_proj - b.F_proj), 2e-14);
+    EXPECT_LE(norm(a.tau - b.tau), 1e-13 * std::max(norm(b.tau), 1e5));
     Matrix grad, baseline_grad;
     here->adjoint(1, 1e-4, {F.data(), 9, 1}, {C.data(), 9, 1}, {gP.data(), 9, 1}, {gt.data(), 9, 1},
                   {grad.data(), 9, 1}, {}, sum.data());
@@ -160,12 +173,16 @@ TEST_P(LawsOnIsa, AgreeAcrossInstructionSets) {
                       {gt.data(), 9, 1}, {baseline_grad.data(), 9, 1}, {}, baseline_sum.data());
     EXPECT_LE(norm(grad - baseline_grad), 1e-9 * std::max(norm(baseline_grad), 1.0));
   }
-  for (int i = 0; i < 5; ++i) EXPECT_NEAR(sum[i], baseline_sum[i], 1e-9 * std::abs(sum[i]));
+  for (int i = 0; i < 5; ++i) EXPECT_NEAR(sum[i], baseline_sum[i], 2e-12 * std::abs(sum[i]));
 }
 
-TEST(FixedCorotated, IsItsFormula) {
+class Formulas : public ::testing::TestWithParam<Isa> {};
+INSTANTIATE_TEST_SUITE_P(All, Formulas, ::testing::ValuesIn(kernels::available_isas()),
+                         [](const auto& info) { return isa_suffix(info.param); });
+
+TEST_P(Formulas, FixedCorotated) {
   const LawDescription d = sample_law(LawId::fixed_corotated);
-  const auto law = kernels::make_analytic_law<double>(d);
+  const auto law = kernels::make_analytic_law<double>(d, GetParam());
   std::mt19937_64 random(39);
   for (int i = 0; i < 50; ++i) {
     const Matrix U = random_rotation(random), V = random_rotation(random);
@@ -174,18 +191,18 @@ TEST(FixedCorotated, IsItsFormula) {
     const double J = det(F);
     const Matrix expected =
         multiply(F - R, transposed(F)) * (2 * d.mu) + identity() * (d.lambda * J * (J - 1));
-    EXPECT_LE(norm(apply_law(*law, 1e-4, F).tau - expected), 1e-12 * norm(expected));
+    EXPECT_LE(norm(apply_law(*law, 1e-4, F).tau - expected), 2e-14 * norm(expected));
   }
 }
 
-TEST(Water, IsItsFormula) {
+TEST_P(Formulas, Water) {
   const LawDescription d = sample_law(LawId::water);
-  const auto law = kernels::make_analytic_law<double>(d);
+  const auto law = kernels::make_analytic_law<double>(d, GetParam());
   const LawState state = apply_law(*law, 1e-4, diagonal(1.2, 0.9, 0.8));
   const double J = 1.2 * 0.9 * 0.8;
   EXPECT_LE(norm(state.F_proj - identity() * std::cbrt(J)), 1e-15);
   EXPECT_LE(norm(state.tau - identity() * (d.lambda * J * (J - 1))), 1e-9);
-  EXPECT_NEAR(apply_law(*law, 1e-4, diagonal(1, 1, -1)).F_proj[0], 1e-2, 1e-15);  // J = 1e-6
+  EXPECT_NEAR(apply_law(*law, 1e-4, diagonal(1, 1, -1)).F_proj[0], 1e-2, 1e-16);  // J = 1e-6
 }
 
 // ---- the interface ------------------------------------------------------------------------------
@@ -195,38 +212,28 @@ TEST(Laws, NamesGoBothWays) {
     const LawId id = static_cast<LawId>(i);
     EXPECT_EQ(kernels::law_id(kernels::law_name(id)), id);
   }
-  try {
-    kernels::law_id("rubber");
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("non_newtonian"), std::string::npos);
-    EXPECT_NE(std::string(error.what()).find("\"rubber\""), std::string::npos);
-  }
+  EXPECT_THAT(error_of([] { kernels::law_id("rubber"); }),
+              AllOf(HasSubstr("non_newtonian"), HasSubstr("\"rubber\"")));
 }
 
 TEST(Laws, ParametersAreChecked) {
   const double nan = std::nan("");
-  const auto message = [](LawId id, double LawDescription::*member, double value) {
+  const auto make = [](LawId id, double LawDescription::*member, double value) {
     LawDescription d = sample_law(id);
     d.*member = value;
-    try {
-      kernels::make_law<double>(d);
-    } catch (const Error& error) {
-      return std::string(error.what());
-    }
-    return std::string();
+    kernels::make_law<double>(d);
   };
-  EXPECT_NE(message(LawId::elastic, &LawDescription::mu, 0).find("parameter mu"),
-            std::string::npos);
-  EXPECT_NE(message(LawId::elastic, &LawDescription::lambda, -3).find("found -3"),
-            std::string::npos);
-  EXPECT_NE(message(LawId::plasticine, &LawDescription::tau_y, nan).find("tau_y"),
-            std::string::npos);
-  EXPECT_NE(message(LawId::sand, &LawDescription::theta, 1.6).find("pi/2"), std::string::npos);
-  EXPECT_NE(message(LawId::non_newtonian, &LawDescription::eta, -1).find("eta"), std::string::npos);
+  const auto message = [&](LawId id, double LawDescription::*member, double value) {
+    return error_of([&] { make(id, member, value); });
+  };
+  EXPECT_THAT(message(LawId::elastic, &LawDescription::mu, 0), HasSubstr("parameter mu"));
+  EXPECT_THAT(message(LawId::elastic, &LawDescription::lambda, -3), HasSubstr("found -3"));
+  EXPECT_THAT(message(LawId::plasticine, &LawDescription::tau_y, nan), HasSubstr("tau_y"));
+  EXPECT_THAT(message(LawId::sand, &LawDescription::theta, 1.6), HasSubstr("pi/2"));
+  EXPECT_THAT(message(LawId::non_newtonian, &LawDescription::eta, -1), HasSubstr("eta"));
   // Parameters that a law does not have are not looked at.
-  EXPECT_EQ(message(LawId::water, &LawDescription::mu, nan), "");
-  EXPECT_EQ(message(LawId::plasticine, &LawDescription::tau_y, 0), "");
+  EXPECT_NO_THROW(make(LawId::water, &LawDescription::mu, nan));
+  EXPECT_NO_THROW(make(LawId::plasticine, &LawDescription::tau_y, 0));
 }
 
 TEST(Laws, ParameterGradientFollowsTheNames) {
@@ -263,9 +270,9 @@ TEST_P(LawsOnIsa, WorksInPlaceAndAddsUp) {
                  {grad_in_place.data(), 9, 1}, {}, twice.data());
   }
   EXPECT_EQ(grad_in_place, grad);
-  for (int i = 0; i < 5; ++i) EXPECT_NEAR(twice[i], 2 * once[i], 1e-12 * std::abs(once[i]));
+  for (int i = 0; i < 5; ++i) EXPECT_NEAR(twice[i], 2 * once[i], 1e-15 * std::abs(once[i]));
   const double of_C = id() == LawId::newtonian ? 1 + 0.25 * sample_law(id()).mu : 1;
-  EXPECT_NEAR(grad_C[1], of_C, 1e-12 * of_C);
+  EXPECT_NEAR(grad_C[1], of_C, 1e-15 * of_C);
 }
 
 }  // namespace

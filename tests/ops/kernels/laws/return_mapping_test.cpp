@@ -4,6 +4,7 @@
 
 #include <string>
 
+#include "ops/kernels/laws/analytic_law.hpp"
 #include "tests/support/law_gradients.hpp"
 #include "tests/support/law_invariants.hpp"
 
@@ -33,12 +34,12 @@ TEST_P(Plastic, KeepsTheBitsOfFInsideAndProjectsOntoTheSurfaceOutside) {
     EXPECT_GT(norm(projected - outside), 1e-3);
     const Eigen::Matrix3d e = hencky_tensor(projected);
     const double q = (e - e.trace() / 3 * Eigen::Matrix3d::Identity()).norm();
-    EXPECT_NEAR(e.trace(), t, 1e-13);
+    EXPECT_NEAR(e.trace(), t, 2e-14);
     if (GetParam() == LawId::non_newtonian) {
       EXPECT_GT(q, 1.001 * k);
       EXPECT_LT(q, 2 * k);
     } else {
-      EXPECT_NEAR(q, k, 1e-13);
+      EXPECT_NEAR(q, k, 2e-14);
     }
   }
 }
@@ -54,7 +55,7 @@ TEST_P(Plastic, GradientsHoldOnBothSidesOfTheSurface) {
       for (const Stage stage : {Stage::project, Stage::fused}) {
         const LawGradientCheck check = make_check(GetParam(), stage, kernels::active_isa(), random);
         const auto e = check.errors(F, Matrix{}, parameter_array(d), 2e-6);
-        EXPECT_LE(e.worst(), 1e-6) << stage_name(stage) << " at " << off;
+        EXPECT_LE(e.worst(), 1e-7) << stage_name(stage) << " at " << off;
       }
     }
   }

@@ -100,10 +100,10 @@ TEST_P(LawLossesOnIsa, ValuesAndGradientsAreThoseOfTheBaseline) {
   for (const LawLossCase& c : testing::law_loss_cases()) {
     const auto value = means<double>(Isa::baseline, c), slope = gradient<double>(Isa::baseline, c);
     for (const double v : value) EXPECT_GT(v, 0);
-    EXPECT_LE(testing::relative_error(means<double>(GetParam(), c), value), 1e-12);
-    EXPECT_LE(testing::relative_error(means<float>(GetParam(), c), value), 1e-5);
-    EXPECT_LE(testing::relative_error(gradient<double>(GetParam(), c), slope), 1e-12);
-    EXPECT_LE(testing::relative_error(gradient<float>(GetParam(), c), slope), 1e-4);
+    EXPECT_LE(testing::relative_error(means<double>(GetParam(), c), value), 1e-14);
+    EXPECT_LE(testing::relative_error(means<float>(GetParam(), c), value), 2e-6);
+    EXPECT_LE(testing::relative_error(gradient<double>(GetParam(), c), slope), 1e-14);
+    EXPECT_LE(testing::relative_error(gradient<float>(GetParam(), c), slope), 2e-6);
   }
 }
 
@@ -114,7 +114,7 @@ TEST_P(LawLossesOnIsa, GradientsAgreeWithCentralDifferences) {
     const std::int64_t count = c.state_caps ? c.samples : 1;
     for (std::int64_t k = 0; k < count; ++k)
       got[std::size_t(4 + 3 * count + k)] = want[std::size_t(4 + 3 * count + k)] = 0;
-    EXPECT_LE(testing::relative_error(got, want), 1e-6)
+    EXPECT_LE(testing::relative_error(got, want), 2e-8)
         << c.samples << " samples, " << c.state_caps << c.state_moduli;
   }
 }
@@ -124,7 +124,7 @@ TEST_P(LawLossesOnIsa, TheShareHasItsGradientWhereTheLawCuts) {
     // All of the gradient, on samples of the two kinds that the law cuts.
     for (std::int64_t& row : c.rows) row = row % 3 == 0 ? row + 1 : row;
     EXPECT_LE(testing::relative_error(gradient<double>(GetParam(), c), differences(GetParam(), c)),
-              1e-6)
+              2e-8)
         << c.samples << " samples, " << c.state_caps << c.state_moduli;
   }
 }
@@ -152,11 +152,11 @@ TEST_P(LawLossesOnIsa, FeaturesAndTheirGradient) {
     EXPECT_LE(testing::relative_error(
                   {table.features_adjoint(at(log_e), of_projection.data(), of_stress.data())},
                   testing::central_differences(loss, log_e, {1e-4})),
-              1e-8);
+              2e-10);
     table.features(at(log_e), projection.data(), stress.data());
     baseline.features(at(log_e), expected.data(), unused.data());
-    EXPECT_LE(testing::relative_error(projection, expected), 1e-13);
-    EXPECT_LE(testing::relative_error(stress, unused), 1e-13);
+    EXPECT_LE(testing::relative_error(projection, expected), 1e-15);
+    EXPECT_LE(testing::relative_error(stress, unused), 1e-15);
   }
 }
 

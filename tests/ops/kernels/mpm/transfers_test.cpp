@@ -2,17 +2,17 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <omp.h>
 
 #include <cmath>
 #include <limits>
 #include <random>
 #include <vector>
 
-#include "ops/kernels/base/error.hpp"
 #include "ops/kernels/mpm/grid_plan.hpp"
 #include "ops/kernels/mpm/mpm_table.hpp"
 #include "ops/kernels/simd/aligned_buffer.hpp"
+#include "tests/support/error_of.hpp"
+#include "tests/support/on_threads.hpp"
 
 namespace uniphy::kernels {
 namespace {
@@ -95,7 +95,7 @@ TYPED_TEST(TransfersOfType, P2gConservesMassMomentumAndAngularMomentum) {
     }
   }
   for (int k = 0; k < 7; ++k) {
-    EXPECT_NEAR(nodes[k], particles[k], 16 * std::numeric_limits<T>::epsilon() * scale[k]) << k;
+    EXPECT_NEAR(nodes[k], particles[k], 4 * std::numeric_limits<T>::epsilon() * scale[k]) << k;
   }
 }
 
@@ -126,7 +126,7 @@ TYPED_TEST(TransfersOfType, G2pReproducesLinearFields) {
       EXPECT_NEAR(v[3 * p + c], expected, 40 * eps);
       EXPECT_NEAR(x[3 * p + c], at[c] + cloud.grid.dt * v[3 * p + c], 2 * eps);
       for (int b = 0; b < 3; ++b) {
-        EXPECT_NEAR(C[9 * p + 3 * c + b], B[3 * c + b], 40 * n * eps);
+        EXPECT_NEAR(C[9 * p + 3 * c + b], B[3 * c + b], 100 * n * eps);
       }
     }
   }
@@ -147,7 +147,7 @@ TYPED_TEST(TransfersOfType, TheWholeTransferConservesMomentum) {
       after += double(cloud.mass[p]) * v[3 * p + a];
       scale += double(cloud.mass[p]) * std::abs(cloud.v[3 * p + a]);
     }
-    EXPECT_NEAR(after, before, 16 * std::numeric_limits<T>::epsilon() * scale);
+    EXPECT_NEAR(after, before, std::numeric_limits<T>::epsilon() * scale);
   }
 }
 
@@ -200,14 +200,10 @@ TYPED_TEST(TransfersOfType, GravityActsOnEmptyNodesToo) {
 
 TYPED_TEST(TransfersOfType, SameBitsOnAnyNumberOfThreads) {
   const Cloud<TypeParam> cloud(3000);
-  const int before = omp_get_max_threads();
-  omp_set_num_threads(1);
-  const auto one = cloud.to_grid();
-  omp_set_num_threads(2);
-  EXPECT_EQ(one, cloud.to_grid());
-  omp_set_num_threads(3);
-  EXPECT_EQ(one, cloud.to_grid());
-  omp_set_num_threads(before);
+  const auto to_grid = [&] { return cloud.to_grid(); };
+  const auto one = testing::on_threads(1, to_grid);
+  EXPECT_EQ(one, testing::on_threads(2, to_grid));
+  EXPECT_EQ(one, testing::on_threads(3, to_grid));
 }
 
 /// The loops of one instruction set on one chunk, layer by layer or at once.
@@ -262,12 +258,16 @@ TYPED_TEST(TransfersOfType, InstructionSetsAgreeWithinRounding) {
   for (const int count : {1, 13, 64}) {
     const Cloud<T> cloud(count);
     const std::vector<T> baseline = scatter_and_gather(Isa::baseline, cloud, cloud.grid.n);
-    double scale = 0;
-    for (const T x : baseline) scale = std::max(scale, std::abs(double(x)));
+    // Each number of the nodes and each plane of the moments by its own size.
+    const std::size_t nodes = grid_size(cloud.grid.n);
+    const auto part = [&](std::size_t k) { return k < nodes ? k % 4 : 4 + (k - nodes) / count; };
+    std::vector<double> scale(part(baseline.size()));
+    for (std::size_t k = 0; k < baseline.size(); ++k)
+      scale[part(k)] = std::max(scale[part(k)], std::abs(double(baseline[k])));
     for (const Isa isa : available_isas()) {
       const std::vector<T> found = scatter_and_gather(isa, cloud, cloud.grid.n);
       for (std::size_t k = 0; k < baseline.size(); ++k) {
-        EXPECT_NEAR(found[k], baseline[k], 64 * std::numeric_limits<T>::epsilon() * scale)
+        EXPECT_NEAR(found[k], baseline[k], 16 * std::numeric_limits<T>::epsilon() * scale[part(k)])
             << isa_name(isa) << " " << k;
       }
     }
@@ -305,9 +305,9 @@ TEST(GridPlan, SharesEveryTouchedLayerOnce) {
     EXPECT_EQ(plan.cut(parts, parts), 25);
     for (int p = 0; p < parts; ++p) EXPECT_LE(plan.cut(p, parts), plan.cut(p + 1, parts));
   }
-  // Two thirds of the work are below layer 20.
-  EXPECT_GT(plan.cut(1, 2), 6);
-  EXPECT_LE(plan.cut(1, 2), 20);
+  // Half of the work: 15 pairs of a chunk and a layer, of which layers 5 to 8 hold 1 + 2 + 2 + 2.
+  EXPECT_GE(plan.cut(1, 2), 8);
+  EXPECT_LE(plan.cut(1, 2), 10);
 }
 
 TEST(Transfers, StencilsThatLeaveTheGridAreErrors) {
@@ -315,19 +315,15 @@ TEST(Transfers, StencilsThatLeaveTheGridAreErrors) {
   GridSettings settings;
   const std::vector<double> zero(9, 0), one(1, 1);
   std::vector<double> grid(8000 * 4);
-  const auto message = [&](double x) -> std::string {
+  const auto transfer = [&](double x) {
     const std::vector<double> at = {0.5, x, 0.5};
-    try {
-      p2g<double>(settings,
-                  {1, at.data(), zero.data(), zero.data(), zero.data(), one.data(), one.data()},
-                  grid.data());
-    } catch (const Error& e) {
-      return e.what();
-    }
-    return "none";
+    p2g<double>(settings,
+                {1, at.data(), zero.data(), zero.data(), zero.data(), one.data(), one.data()},
+                grid.data());
   };
-  EXPECT_EQ(message(0.025), "none");
-  EXPECT_EQ(message(0.9249999), "none");
+  const auto message = [&](double x) { return testing::error_of([&] { transfer(x); }); };
+  EXPECT_NO_THROW(transfer(0.025));
+  EXPECT_NO_THROW(transfer(0.9249999));
   EXPECT_THAT(message(0.0249999),
               AllOf(HasSubstr("particle 0 at (0.5, 0.0249999, 0.5)"), HasSubstr("[0.025, 0.925)")));
   EXPECT_THAT(message(0.925), HasSubstr("leaves the grid"));

@@ -90,8 +90,8 @@ TEST_P(Svd3OnIsa, KeepsTheRelativeAccuracyOfSmallSingularValues) {
     const Matrix U = random_rotation(random);
     // Scaled columns: F = U diag, so that the small values are exact in the entries.
     const Factors f = decompose<double>(multiply(U, diagonal(1, 1e-7, 1e-13)), GetParam());
-    EXPECT_NEAR(f.sigma[4], 1e-7, 1e-21);
-    EXPECT_NEAR(f.sigma[8], 1e-13, 1e-27);
+    EXPECT_NEAR(f.sigma[4], 1e-7, 2e-22);
+    EXPECT_NEAR(f.sigma[8], 1e-13, 3e-28);
   }
 }
 
@@ -161,7 +161,7 @@ TEST_P(Svd3OnIsa, GradientOfTheFactorsIsExactWhereTheyAreUnique) {
       const Matrix F = composed(random_rotation(random), s, random_rotation(random));
       const FactorLoss loss{random_matrix(random), random_matrix(random), random_matrix(random),
                             random_matrix(random)};
-      EXPECT_LE(loss.error(F, GetParam()), 1e-6) << ::testing::PrintToString(s);
+      EXPECT_LE(loss.error(F, GetParam()), 2e-8) << ::testing::PrintToString(s);
     }
   }
 }
@@ -180,11 +180,11 @@ TEST_P(Svd3OnIsa, GradientOfTheFactorsIsBoundedWhereTheyAreNot) {
     const Matrix grad = loss.gradient(f, GetParam());
     EXPECT_TRUE(std::isfinite(norm(grad))) << ::testing::PrintToString(s);
     if (s[0] > 0.5) {
-      EXPECT_LE(norm(grad), 1e8) << ::testing::PrintToString(s);
+      EXPECT_LE(norm(grad), 2e6) << ::testing::PrintToString(s);
       // Uᵀ (dL/dF) V has dL/dσ on its diagonal whatever happens off it.
       const Matrix frame = multiply(multiply(transposed(f.U), grad), f.V);
       for (int i = 0; i < 3; ++i)
-        EXPECT_NEAR(frame[4 * i], loss.W[4 * i], 1e-8 * std::max(1.0, norm(grad)));
+        EXPECT_NEAR(frame[4 * i], loss.W[4 * i], 1e-14 * std::max(1.0, norm(grad)));
     }
   }
 }
