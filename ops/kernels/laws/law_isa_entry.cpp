@@ -30,14 +30,7 @@ constexpr LawTable<T> kTable{
 
 }  // namespace
 
-template <>
-const LawTable<float>& isa_table() {
-  return kTable<float>;
-}
-template <>
-const LawTable<double>& isa_table() {
-  return kTable<double>;
-}
+UNIPHY_DEFINE_ISA_TABLES(LawTable, kTable)
 
 }  // namespace UNIPHY_ISA
 }  // namespace uniphy::kernels

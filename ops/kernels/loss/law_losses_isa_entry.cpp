@@ -12,14 +12,7 @@ constexpr LawLossesTable<T> kTable{law_losses<T>, law_losses_adjoint<T>, isotrop
 
 }  // namespace
 
-template <>
-const LawLossesTable<float>& isa_table() {
-  return kTable<float>;
-}
-template <>
-const LawLossesTable<double>& isa_table() {
-  return kTable<double>;
-}
+UNIPHY_DEFINE_ISA_TABLES(LawLossesTable, kTable)
 
 }  // namespace UNIPHY_ISA
 }  // namespace uniphy::kernels

@@ -29,14 +29,7 @@ constexpr MpmTable<T> kTable{stencil<T>,
 
 }  // namespace
 
-template <>
-const MpmTable<float>& isa_table() {
-  return kTable<float>;
-}
-template <>
-const MpmTable<double>& isa_table() {
-  return kTable<double>;
-}
+UNIPHY_DEFINE_ISA_TABLES(MpmTable, kTable)
 
 }  // namespace UNIPHY_ISA
 }  // namespace uniphy::kernels

@@ -6,12 +6,11 @@
 #include "ops/kernels/simd/isa.hpp"
 
 // How code is reached that is compiled once for each instruction set. Such a file, *_isa_entry.cpp,
-// lists its functions in a table of function pointers and defines isa_table for it in the namespace
-// of the instruction set that it is compiled for (UNIPHY_ISA of lanes.hpp):
-//   template <>
-//   const MpmTable<float>& isa_table() { return ...; }
-// The header of the table declares these definitions, UNIPHY_ISA_TABLE(MpmTable<float>), and
-// table_of chooses among them while the program runs.
+// lists its functions in a table of function pointers and gives it to isa_table in the namespace of
+// the instruction set that it is compiled for (UNIPHY_ISA of lanes.hpp). For tables MpmTable<T>:
+//   UNIPHY_ISA_TABLE(MpmTable<float>) UNIPHY_ISA_TABLE(MpmTable<double>)   in their header,
+//   UNIPHY_DEFINE_ISA_TABLES(MpmTable, kTable)                             in the entry file,
+// where kTable<T> is the table. table_of chooses among them while the program runs.
 
 namespace uniphy::kernels {
 
@@ -45,6 +44,17 @@ const Table& isa_table();
 #else
 #define UNIPHY_ISA_TABLE(...) UNIPHY_ISA_TABLE_IN(isa_baseline, __VA_ARGS__)
 #endif
+
+/// In namespace UNIPHY_ISA of an entry file: table<T> is the Table<T> of this instruction set.
+#define UNIPHY_DEFINE_ISA_TABLES(Table, table) \
+  template <>                                  \
+  const Table<float>& isa_table() {            \
+    return table<float>;                       \
+  }                                            \
+  template <>                                  \
+  const Table<double>& isa_table() {           \
+    return table<double>;                      \
+  }
 
 /// The table of an instruction set. Throws Error where this build or CPU lacks it.
 template <class Table>
