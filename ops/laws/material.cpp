@@ -17,13 +17,30 @@ using torch::Tensor;
 Parameter::Parameter(double value) : tensor_(torch::scalar_tensor(value, torch::kFloat64)) {}
 Parameter::Parameter(Tensor tensor) : tensor_(std::move(tensor)) {}
 
+Material material_of(const kernels::LawDescription& law) {
+  Material material;
+  for (const kernels::LawParameter& p : kernels::law_parameters(law.id))
+    material.*kMaterialMembers[p.place] = law.*p.member;
+  return material;
+}
+
+Material material_of(kernels::LawId law, const Tensor& parameters) {
+  const auto& taken = kernels::law_parameters(law);
+  const auto type = real_type("material", "parameters", parameters);
+  check_tensor("material", "parameters", parameters, type, {std::int64_t(taken.size())});
+  Material material;
+  std::int64_t k = 0;
+  for (const kernels::LawParameter& p : taken)
+    material.*kMaterialMembers[p.place] = parameters.select(0, k++);
+  return material;
+}
+
 Tensor pack_material(const char* op, kernels::LawId law, const Material& m) {
   if (law == kernels::LawId::learned)
     throw Error(std::string(op) + ": law: expected an analytic one, found learned");
-  const Parameter* const all[] = {&m.mu, &m.lambda, &m.tau_y, &m.theta, &m.eta};
   std::vector<Tensor> entries;
   for (const kernels::LawParameter& p : kernels::kLawParameterTable) {
-    const Tensor& t = all[p.place]->tensor();
+    const Tensor& t = (m.*kMaterialMembers[p.place]).tensor();
     if (!t.defined() || t.numel() != 1 || !t.is_floating_point() || !t.device().is_cpu())
       refuse(op, p.name, "one Float or Double number on cpu", t);
     entries.push_back(t.to(torch::kFloat64).reshape({}));

@@ -19,7 +19,11 @@ struct MaterialLeaves {
     for (const kernels::LawParameter& p : kernels::kLawParameterTable)
       leaves[p.place] = torch::scalar_tensor(d.*p.member, torch::kFloat64).set_requires_grad(true);
   }
-  ops::Material material() const { return {leaves[0], leaves[1], leaves[2], leaves[3], leaves[4]}; }
+  ops::Material material() const {
+    ops::Material material;
+    for (int i = 0; i < 5; ++i) material.*ops::kMaterialMembers[i] = leaves[i];
+    return material;
+  }
   /// dL/d(log parameter), so that pascals and radians compare; 0 where undefined.
   torch::Tensor gradient(const torch::Tensor& loss) const {
     const auto g = torch::autograd::grad({loss}, {leaves.begin(), leaves.end()}, {}, true, false,
@@ -64,10 +68,6 @@ void expect_same_bits_on_threads(const kernels::LawDescription& d, const Op& op)
   for (std::size_t i = 0; i < one.size(); ++i) {
     EXPECT_TRUE(torch::equal(one[i], two[i])) << i;
   }
-}
-
-inline ops::Material numbers(const kernels::LawDescription& d) {
-  return {d.mu, d.lambda, d.tau_y, d.theta, d.eta};
 }
 
 /// The states where autograd through torch's SVD has a gradient to compare with.

@@ -20,7 +20,7 @@ using torch::Tensor;
 class KirchhoffStressOp : public AnalyticLaws {
  protected:
   Tensor stress(const Tensor& F, const Tensor& C) const {
-    return ops::kirchhoff_stress(id(), F, C, numbers(description()));
+    return ops::kirchhoff_stress(id(), F, C, ops::material_of(description()));
   }
 };
 INSTANTIATE_TEST_SUITE_P(All, KirchhoffStressOp, ::testing::ValuesIn(analytic_laws()),
@@ -34,7 +34,8 @@ TEST_P(KirchhoffStressOp, AgreesWithTheReference) {
   torch::manual_seed(6);
   const Tensor C = 10 * torch::randn_like(all);
   const Tensor tau = stress(all, C);
-  const Tensor reference = ops::reference::kirchhoff_stress(id(), all, C, numbers(description()));
+  const Tensor reference =
+      ops::reference::kirchhoff_stress(id(), all, C, ops::material_of(description()));
   for (int64_t p = 0; p < all.size(0); ++p) {
     const double scale = std::max(reference[p].abs().max().item<double>(), 1e4);
     // J, and with it J⁻⁶, is known to rounding of the entries of F only.
@@ -105,7 +106,7 @@ TEST(KirchhoffStressOp, RefusesBadArguments) {
   const auto message = [&](LawId law, const Tensor& f, const Tensor& C, const ops::Material& m) {
     return error_of([&] { ops::kirchhoff_stress(law, f, C, m); });
   };
-  const ops::Material good = numbers(sample_law(LawId::elastic));
+  const ops::Material good = ops::material_of(sample_law(LawId::elastic));
   EXPECT_THAT(message(LawId::elastic, F.to(torch::kInt64), {}, good),
               HasSubstr("found [32, 3, 3] Long"));
   EXPECT_THAT(message(LawId::elastic, F, torch::zeros({4, 3, 3}, torch::kFloat64), good),

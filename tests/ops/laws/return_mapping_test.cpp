@@ -27,11 +27,12 @@ INSTANTIATE_TEST_SUITE_P(All, ReturnMappingOp, ::testing::ValuesIn(analytic_laws
 
 TEST_P(ReturnMappingOp, AgreesWithTheReference) {
   for (const Tensor& F : {case_tensor(description()), separated_states()}) {
-    const Tensor projected = ops::return_mapping(id(), F, numbers(description()), kDt);
-    const Tensor reference = ops::reference::return_mapping(id(), F, numbers(description()), kDt);
+    const Tensor projected = ops::return_mapping(id(), F, ops::material_of(description()), kDt);
+    const Tensor reference =
+        ops::reference::return_mapping(id(), F, ops::material_of(description()), kDt);
     EXPECT_LE(relative_difference(projected, reference), 4e-14);
     const Tensor single =
-        ops::return_mapping(id(), F.to(torch::kFloat32), numbers(description()), kDt);
+        ops::return_mapping(id(), F.to(torch::kFloat32), ops::material_of(description()), kDt);
     EXPECT_EQ(single.scalar_type(), torch::kFloat32);
     EXPECT_LE(relative_difference(single.to(torch::kFloat64), reference), 5e-6);
   }
@@ -61,7 +62,7 @@ TEST_P(ReturnMappingOp, GradientAgreesWithTheReferenceWhereItExists) {
 TEST_P(ReturnMappingOp, GradientMatchesCentralDifferencesAtEqualSingularValues) {
   torch::manual_seed(4);
   expect_gradient_by_differences(description(), 1e-3, [&](const Tensor& F) {
-    return ops::return_mapping(id(), F, numbers(description()), kDt);
+    return ops::return_mapping(id(), F, ops::material_of(description()), kDt);
   });
 }
 
@@ -81,16 +82,16 @@ TEST_P(ReturnMappingOp, UndefinedGradientsStayUndefined) {
   EXPECT_TRUE(answer[1].defined());
   for (const Tensor& none : answer_of_backward(projected, {Tensor()})) EXPECT_FALSE(none.defined());
   const Tensor wanted = separated_states().set_requires_grad(true);
-  ops::return_mapping(id(), wanted, numbers(description()), kDt).sum().backward();
+  ops::return_mapping(id(), wanted, ops::material_of(description()), kDt).sum().backward();
   EXPECT_TRUE(wanted.grad().defined());
-  EXPECT_FALSE(ops::return_mapping(id(), F, numbers(description()), kDt).requires_grad());
+  EXPECT_FALSE(ops::return_mapping(id(), F, ops::material_of(description()), kDt).requires_grad());
 }
 
 TEST_P(ReturnMappingOp, TakesAnyLayoutAndAnyCount) {
   const Tensor F = separated_states();
   const Tensor strided = F.transpose(1, 2).contiguous().transpose(1, 2);
   const auto map = [&](const Tensor& f) {
-    return ops::return_mapping(id(), f, numbers(description()), kDt);
+    return ops::return_mapping(id(), f, ops::material_of(description()), kDt);
   };
   EXPECT_TRUE(torch::equal(map(strided), map(F)));
   EXPECT_EQ(map(F.slice(0, 0, 0)).sizes(), torch::IntArrayRef({0, 3, 3}));
@@ -102,7 +103,7 @@ TEST(ReturnMappingOp, RefusesBadArguments) {
   const auto message = [&](LawId law, const Tensor& f, const ops::Material& m, double dt) {
     return error_of([&] { ops::return_mapping(law, f, m, dt); });
   };
-  const ops::Material good = numbers(sample_law(LawId::sand));
+  const ops::Material good = ops::material_of(sample_law(LawId::sand));
   EXPECT_THAT(
       message(LawId::sand, F.view({-1, 9}), good, kDt),
       AllOf(HasSubstr("return_mapping: F: expected [P, 3, 3]"), HasSubstr("found [32, 9]")));
