@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "ops/kernels/laws/law_parameters.hpp"
 #include "uniphy/geometry/shapes/box.hpp"
 #include "uniphy/io/hdf5.hpp"
 #include "uniphy/scene/scene.hpp"

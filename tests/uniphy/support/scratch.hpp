@@ -44,4 +44,13 @@ class Scratch {
   std::filesystem::path path_;
 };
 
+/// The directory is taken out of a message, so that it can be compared as a whole.
+inline std::string without_directory(std::string message, const std::filesystem::path& directory) {
+  const std::string prefix = directory.string() + "/";
+  for (std::size_t at; (at = message.find(prefix)) != std::string::npos;) {
+    message.erase(at, prefix.size());
+  }
+  return message;
+}
+
 }  // namespace uniphy::testing
