@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "ops/kernels/base/statistics.hpp"
 #include "uniphy/data/law_branches.hpp"
 
 namespace uniphy {
@@ -11,18 +12,8 @@ namespace {
 
 constexpr double kLargeAffine = 10;  ///< 1/s
 
-double norm9(const double* m) {
-  double square = 0;
-  for (int k = 0; k < 9; ++k) square += m[k] * m[k];
-  return std::sqrt(square);
-}
-
 bool is_yielding(const std::string& branch) {
   return branch == "yield" || branch == "yield_near" || branch == "apex";
-}
-
-double quantile(const std::vector<double>& sorted, double share) {
-  return sorted[static_cast<std::size_t>(share * static_cast<double>(sorted.size() - 1))];
 }
 
 std::int64_t sum(const std::vector<std::int64_t>& counts) {
@@ -58,7 +49,8 @@ void DatasetMetrics::add(const TrajectorySetup& setup, const TrajectoryPart& par
     ++(simulated ? material.simulated : material.drawn)[branch];
     yields = yields || (simulated && is_yielding(names[branch]));
     material.strains.push_back(features[s].strain);
-    if (norm9(&part.samples.C[9 * s]) > kLargeAffine) ++material.large_affine;
+    if (kernels::sum_of_squares(&part.samples.C[9 * s], 9) > kLargeAffine * kLargeAffine)
+      ++material.large_affine;
   }
   ++material.trajectories;
   material.yielding += yields ? 1 : 0;
@@ -90,12 +82,10 @@ void DatasetMetrics::write(Metrics& metrics) const {
       metrics.set("share_simulated." + name + "." + branches[b], ratio(m.simulated[b], simulated));
     }
     metrics.set("large_affine." + name, ratio(m.large_affine, all));
-    std::vector<double> strains = m.strains;
-    if (strains.empty()) continue;
-    std::sort(strains.begin(), strains.end());
-    metrics.set("strain_low." + name, quantile(strains, 0.01));
-    metrics.set("strain_median." + name, quantile(strains, 0.5));
-    metrics.set("strain_high." + name, quantile(strains, 0.99));
+    if (m.strains.empty()) continue;
+    metrics.set("strain_low." + name, kernels::quantile(m.strains, 0.01));
+    metrics.set("strain_median." + name, kernels::quantile(m.strains, 0.5));
+    metrics.set("strain_high." + name, kernels::quantile(m.strains, 0.99));
   }
 }
 

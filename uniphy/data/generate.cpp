@@ -3,27 +3,19 @@
 #include <fmt/format.h>
 
 #include <cstdio>
-#include <exception>
+#include <mutex>
 
 #include "ops/kernels/base/error.hpp"
+#include "ops/kernels/base/hash.hpp"
 #include "uniphy/data/dataset_metrics.hpp"
 #include "uniphy/data/part_file.hpp"
 #include "uniphy/data/random_streams.hpp"
 #include "uniphy/data/simulate_samples.hpp"
 #include "uniphy/io/atomic_file.hpp"
-#include "uniphy/report/progress.hpp"
+#include "uniphy/report/for_each_with_progress.hpp"
 
 namespace uniphy {
 namespace {
-
-/// FNV-1a: the same on every platform.
-std::uint64_t hash_text(const std::string& text) {
-  std::uint64_t hash = 0xcbf29ce484222325ULL;
-  for (const char c : text) {
-    hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3ULL;
-  }
-  return hash;
-}
 
 std::string describe(const TrajectorySetup& setup) {
   std::string text = setup.record.material;
@@ -58,38 +50,20 @@ void make_parts(const GenerateOptions& options, const std::filesystem::path& dir
   for (std::int64_t i = 0; i < total; ++i) {
     if (!std::filesystem::exists(part_path(directory, i))) open.push_back(i);
   }
-  std::int64_t done = total - static_cast<std::int64_t>(open.size());
-  Progress progress("generate", total, "trajectories");
-  std::exception_ptr failure;
-#pragma omp parallel for schedule(dynamic, 1)
-  for (std::size_t k = 0; k < open.size(); ++k) {
-    bool stop;
-#pragma omp critical(uniphy_generate)
-    stop = failure != nullptr;
-    if (stop) continue;
-    try {
-      const TrajectoryPart part = make_trajectory(options, open[k]);
-      // HDF5 serves one thread at a time. An exception must not leave the critical section.
-      std::exception_ptr thrown;
-#pragma omp critical(uniphy_generate)
-      try {
+  std::mutex one_at_a_time;  // HDF5 serves one thread at a time
+  for_each_with_progress(
+      "generate", "trajectories", static_cast<std::int64_t>(open.size()),
+      [&](std::int64_t k) {
+        const std::int64_t i = open[static_cast<std::size_t>(k)];
+        const TrajectoryPart part = make_trajectory(options, i);
+        const std::lock_guard<std::mutex> lock(one_at_a_time);
         for (const std::string& reason : part.failures) {
-          std::fprintf(stderr, "left out: trajectory %lld: %s\n", static_cast<long long>(open[k]),
+          std::fprintf(stderr, "left out: trajectory %lld: %s\n", static_cast<long long>(i),
                        reason.c_str());
         }
-        write_part(part_path(directory, open[k]), part);
-        progress.update(++done);
-      } catch (...) {
-        thrown = std::current_exception();
-      }
-      if (thrown) std::rethrow_exception(thrown);
-    } catch (...) {
-#pragma omp critical(uniphy_generate)
-      if (!failure) failure = std::current_exception();
-    }
-  }
-  progress.finish();
-  if (failure) std::rethrow_exception(failure);
+        write_part(part_path(directory, i), part);
+      },
+      total - static_cast<std::int64_t>(open.size()));
 }
 
 }  // namespace
@@ -97,7 +71,7 @@ void make_parts(const GenerateOptions& options, const std::filesystem::path& dir
 void generate_dataset(const GenerateOptions& options, const std::string& config_yaml,
                       const std::filesystem::path& file, Metrics& metrics) {
   std::filesystem::path parts = file;
-  parts += fmt::format(".parts-{:016x}", hash_text(config_yaml));
+  parts += ".parts-" + kernels::Hash().add(config_yaml).text();
   make_directory(parts);
   make_parts(options, parts);
 

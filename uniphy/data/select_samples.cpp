@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "ops/kernels/base/statistics.hpp"
+
 namespace uniphy {
 namespace {
 
@@ -29,13 +31,9 @@ template <class Value>
 std::vector<Indices> cut(const Indices& indices, int parts, const Value& value) {
   std::vector<Indices> result(static_cast<std::size_t>(parts));
   if (indices.empty()) return result;
-  std::vector<double> sorted;
-  for (const std::int64_t i : indices) sorted.push_back(std::log(std::max(kFloor, value(i))));
-  const std::vector<double> logs = sorted;
-  std::sort(sorted.begin(), sorted.end());
-  const auto last = static_cast<double>(sorted.size() - 1);
-  const double low = sorted[static_cast<std::size_t>(0.005 * last)];
-  const double high = sorted[static_cast<std::size_t>(0.995 * last)];
+  std::vector<double> logs;
+  for (const std::int64_t i : indices) logs.push_back(std::log(std::max(kFloor, value(i))));
+  const double low = kernels::quantile(logs, 0.005), high = kernels::quantile(logs, 0.995);
   for (std::size_t k = 0; k < indices.size(); ++k) {
     const double place = high > low ? (logs[k] - low) / (high - low) * parts : 0;
     const auto part = static_cast<std::size_t>(std::clamp(place, 0.0, parts - 1.0));

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "ops/kernels/base/error.hpp"
+#include "ops/kernels/base/statistics.hpp"
 #include "uniphy/data/drawn_states.hpp"
 #include "uniphy/data/law_branches.hpp"
 #include "uniphy/data/select_samples.hpp"
@@ -55,12 +56,6 @@ void check_candidates(std::ptrdiff_t step, const kernels::LawSample<double>& sam
   }
 }
 
-double quantile(std::vector<double> values, double share) {
-  const auto at = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), values.begin() + at, values.end());
-  return values[static_cast<std::size_t>(at)];
-}
-
 std::vector<std::int64_t> count_branches(const std::vector<SampleFeatures>& features,
                                          const std::vector<std::int64_t>& rows,
                                          std::size_t branches) {
@@ -76,16 +71,14 @@ DrawnStateRanges drawn_ranges(const GenerateOptions& options, const LawSamples& 
   std::vector<double> strains, stresses;
   for (const SampleFeatures& f : features) strains.push_back(f.strain);
   for (std::size_t k = 0; k < candidates.tau.size(); k += 9) {
-    double square = 0;
-    for (std::size_t i = k; i < k + 9; ++i) square += candidates.tau[i] * candidates.tau[i];
-    stresses.push_back(std::sqrt(square));
+    stresses.push_back(std::sqrt(kernels::sum_of_squares(&candidates.tau[k], 9)));
   }
-  const double strain = quantile(std::move(strains), kHighQuantile);
+  const double strain = kernels::quantile(std::move(strains), kHighQuantile);
   DrawnStateRanges ranges;
   ranges.strain =
       std::min(options.drawn_strain, std::max(kLeastDrawnStrain, options.drawn_beyond * strain));
   ranges.yield_strain = std::max(options.drawn_strain, strain);
-  ranges.stress = options.drawn_beyond * quantile(std::move(stresses), kHighQuantile);
+  ranges.stress = options.drawn_beyond * kernels::quantile(std::move(stresses), kHighQuantile);
   ranges.step = options.drawn_step;
   ranges.affine_low = options.drawn_affine[0];
   ranges.affine_high = options.drawn_affine[1];

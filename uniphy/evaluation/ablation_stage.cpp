@@ -8,6 +8,7 @@
 #include <cstdio>
 
 #include "ops/kernels/base/error.hpp"
+#include "ops/kernels/base/statistics.hpp"
 #include "uniphy/data/generate.hpp"
 #include "uniphy/evaluation/ablation_report.hpp"
 #include "uniphy/evaluation/law_cost.hpp"
@@ -67,7 +68,7 @@ std::int64_t steps_for(double seconds, const Dataset& data, const TrainingOption
 
 void set_overall(Metrics& metrics, const std::string& name, const std::vector<double>& values,
                  const Dataset& data) {
-  metrics.set(name, median(values));
+  metrics.set(name, kernels::median(values));
   report_errors(data, values, name, metrics);
 }
 

@@ -5,11 +5,12 @@
 #include <cstdio>
 
 #include "ops/kernels/base/error.hpp"
+#include "ops/kernels/base/statistics.hpp"
 #include "uniphy/data/random_rotation.hpp"
 #include "uniphy/data/random_streams.hpp"
 #include "uniphy/data/trajectory_setup.hpp"
-#include "uniphy/evaluation/parallel_work.hpp"
 #include "uniphy/geometry/shape_catalogue.hpp"
+#include "uniphy/report/for_each_with_progress.hpp"
 
 namespace uniphy {
 namespace {
@@ -57,8 +58,8 @@ FrameIndifference of_trajectory(const Dataset& data, std::size_t i,
   const double dt = data.trajectories[i].dt;
   const Answers plain = ask(*law, dt, F, C), turned = ask(*law, dt, turned_F, turned_C);
 
-  double square = 0;
-  for (const double t : plain.tau) square += t * t;
+  const double square =
+      kernels::sum_of_squares(plain.tau.data(), static_cast<std::ptrdiff_t>(plain.tau.size()));
   const double rms = std::sqrt(square / std::max(1.0, static_cast<double>(rotations.size())));
   FrameIndifference worst;
   for (std::size_t s = 0; s < rotations.size(); ++s) {
@@ -120,10 +121,10 @@ FrameIndifference frame_indifference(const Dataset& data,
                                      const std::vector<kernels::LawDescription>& laws,
                                      std::uint64_t seed) {
   std::vector<FrameIndifference> of(laws.size());
-  parallel_work("turn states", "trajectories", static_cast<std::int64_t>(laws.size()),
-                [&](std::int64_t i) {
-                  of[i] = of_trajectory(data, static_cast<std::size_t>(i), laws[i], seed);
-                });
+  for_each_with_progress("turn states", "trajectories", static_cast<std::int64_t>(laws.size()),
+                         [&](std::int64_t i) {
+                           of[i] = of_trajectory(data, static_cast<std::size_t>(i), laws[i], seed);
+                         });
   FrameIndifference worst;
   for (const FrameIndifference& one : of) worst.include(one);
   return worst;
@@ -132,14 +133,15 @@ FrameIndifference frame_indifference(const Dataset& data,
 std::vector<double> rest_drifts(const std::vector<kernels::LawDescription>& laws,
                                 const RestOptions& options) {
   std::vector<double> drifts(laws.size(), 0);
-  parallel_work("rest", "codes", static_cast<std::int64_t>(laws.size()), [&](std::int64_t i) {
-    try {
-      drifts[i] = drift(laws[i], options);
-    } catch (const Error& error) {
-      drifts[i] = 1;
-      std::fprintf(stderr, "at rest, code %lld: %s\n", static_cast<long long>(i), error.what());
-    }
-  });
+  for_each_with_progress(
+      "rest", "codes", static_cast<std::int64_t>(laws.size()), [&](std::int64_t i) {
+        try {
+          drifts[i] = drift(laws[i], options);
+        } catch (const Error& error) {
+          drifts[i] = 1;
+          std::fprintf(stderr, "at rest, code %lld: %s\n", static_cast<long long>(i), error.what());
+        }
+      });
   return drifts;
 }
 

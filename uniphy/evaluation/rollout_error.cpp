@@ -5,7 +5,7 @@
 
 #include "ops/kernels/base/error.hpp"
 #include "uniphy/data/dataset_setup.hpp"
-#include "uniphy/evaluation/parallel_work.hpp"
+#include "uniphy/report/for_each_with_progress.hpp"
 #include "uniphy/scene/comparison.hpp"
 
 namespace uniphy {
@@ -40,11 +40,11 @@ Trajectory roll_out(const TrajectorySetup& setup, const kernels::LawDescription&
 std::vector<RolloutError> rollout_errors(const std::vector<TrajectorySetup>& setups,
                                          const std::vector<kernels::LawDescription>& laws) {
   std::vector<RolloutError> errors(setups.size());
-  parallel_work("roll out", "trajectories", static_cast<std::int64_t>(setups.size()),
-                [&](std::int64_t i) {
-                  const Trajectory truth = roll_out(setups[i], setups[i].law());
-                  errors[i] = compare(truth, setups[i], laws[i]);
-                });
+  for_each_with_progress("roll out", "trajectories", static_cast<std::int64_t>(setups.size()),
+                         [&](std::int64_t i) {
+                           const Trajectory truth = roll_out(setups[i], setups[i].law());
+                           errors[i] = compare(truth, setups[i], laws[i]);
+                         });
   return errors;
 }
 

@@ -10,8 +10,8 @@
 #include <set>
 
 #include "ops/kernels/base/error.hpp"
+#include "ops/kernels/base/for_each.hpp"
 #include "uniphy/inference/fit_problem.hpp"
-#include "uniphy/inference/for_each.hpp"
 #include "uniphy/report/interrupt.hpp"
 #include "uniphy/report/progress.hpp"
 
@@ -97,7 +97,7 @@ class Fit {
     constexpr int kBlock = 32;  // between two looks at the clock
     for (int first = 0; first < starts; first += kBlock) {
       const int count = std::min(kBlock, starts - first);
-      for_each(count, [&](int k) {
+      kernels::for_each(count, [&](int k) {
         const int i = first + k;
         const auto mse =
             problem_.frame_mse(problem_.candidate(i, variables_.start(i)), problem_.frames());
@@ -150,7 +150,7 @@ class Fit {
       }
       if (active.empty()) break;
       std::vector<FitRecord> records(active.size());
-      for_each(static_cast<int>(active.size()), [&](int k) {
+      kernels::for_each(static_cast<int>(active.size()), [&](int k) {
         FitCandidate& best = state_.candidates[active[k]];
         Optimizer& optimizer = *optimizers[active[k]];
         FitCandidate at = problem_.unpack(best.start, optimizer.ask(), state_.stage);
@@ -192,7 +192,7 @@ class Fit {
     const int next = state_.stage + 1;
     state_.epoch = 0;
     if (next < stages() && problem_.frames(next) != problem_.frames(state_.stage)) {
-      for_each(static_cast<int>(state_.candidates.size()), [&](int i) {
+      kernels::for_each(static_cast<int>(state_.candidates.size()), [&](int i) {
         FitCandidate& c = state_.candidates[i];
         const std::ptrdiff_t frames = problem_.frames(next);
         c.mse = mean_of_first(problem_.frame_mse(c, frames), frames);

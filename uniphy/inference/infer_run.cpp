@@ -7,28 +7,14 @@
 #include <limits>
 #include <map>
 
+#include "ops/kernels/base/hash.hpp"
 #include "uniphy/inference/observed_motion.hpp"
 #include "uniphy/scene/comparison.hpp"
 
 namespace uniphy {
 namespace {
 
-/// FNV-1a, 64 bits.
-class Hash {
- public:
-  void add(const void* data, std::size_t bytes) {
-    const auto* p = static_cast<const unsigned char*>(data);
-    for (std::size_t i = 0; i < bytes; ++i) value_ = (value_ ^ p[i]) * 0x100000001b3ULL;
-  }
-  void add(const std::vector<double>& v) { add(v.data(), v.size() * sizeof(double)); }
-  void add(const std::string& s) { add(s.data(), s.size()); }
-  std::string text() const { return fmt::format("{:016x}", value_); }
-
- private:
-  std::uint64_t value_ = 0xcbf29ce484222325ULL;
-};
-
-void add_weights(Hash& hash, const kernels::LawDescription& law) {
+void add_weights(kernels::Hash& hash, const kernels::LawDescription& law) {
   if (law.weights == nullptr) return;
   for (const kernels::MlpWeights* network : {&law.weights->projection, &law.weights->stress}) {
     for (const auto& layer : network->layers) {
@@ -180,7 +166,7 @@ ParticlePicture frames_picture(const std::vector<std::pair<std::string, const Tr
 
 std::string fit_fingerprint(const Observation& observation, const FitVariables& variables,
                             const std::string& text) {
-  Hash hash;
+  kernels::Hash hash;
   hash.add(observation.x);
   hash.add(observation.time);
   hash.add(observation.volume);

@@ -5,19 +5,10 @@
 #include <limits>
 #include <map>
 
+#include "ops/kernels/base/statistics.hpp"
 #include "ops/kernels/laws/law.hpp"
 
 namespace uniphy {
-namespace {
-
-double squared_distance(const double* a, const double* b, std::int64_t count) {
-  double sum = 0;
-  for (std::int64_t k = 0; k < count; ++k) sum += (a[k] - b[k]) * (a[k] - b[k]);
-  return sum;
-}
-
-}  // namespace
-
 std::vector<LawError> law_errors(const Dataset& data,
                                  std::shared_ptr<const kernels::LearnedLawWeights> weights,
                                  const std::vector<double>& latents) {
@@ -46,23 +37,15 @@ std::vector<LawError> law_errors(const Dataset& data,
     kernels::make_law<double>(description)
         ->evaluate(count, dt, {F_proj, 9, 1}, {C, 9, 1}, {unused.data(), 9, 1},
                    {stress.data(), 9, 1});
-    const std::vector<double> zero(projected.size(), 0.0);
-    const double of_stress = squared_distance(stress.data(), tau, 9 * count);
-    const double stress_size = squared_distance(zero.data(), tau, 9 * count);
-    const double of_projection = squared_distance(projected.data(), F_proj, 9 * count);
-    const double change = squared_distance(F_proj, F, 9 * count);
+    const double of_stress = kernels::squared_distance(stress.data(), tau, 9 * count);
+    const double stress_size = kernels::sum_of_squares(tau, 9 * count);
+    const double of_projection = kernels::squared_distance(projected.data(), F_proj, 9 * count);
+    const double change = kernels::squared_distance(F_proj, F, 9 * count);
     errors[i].stress = std::sqrt(of_stress / std::max(stress_size, 1e-300));
     errors[i].projection = change > 0 ? std::sqrt(of_projection / change)
                                       : std::sqrt(of_projection / double(9 * count));
   }
   return errors;
-}
-
-double median(std::vector<double> values) {
-  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
-  std::sort(values.begin(), values.end());
-  const std::size_t n = values.size();
-  return n % 2 ? values[n / 2] : 0.5 * (values[n / 2 - 1] + values[n / 2]);
 }
 
 void report_errors(const Dataset& data, const std::vector<double>& values, const std::string& name,
@@ -74,7 +57,7 @@ void report_errors(const Dataset& data, const std::vector<double>& values, const
         std::isfinite(values[i]) ? values[i] : std::numeric_limits<double>::infinity());
   }
   for (const auto& [material, list] : of) {
-    metrics.set(name + "." + material, median(list));
+    metrics.set(name + "." + material, kernels::median(list));
     metrics.set(name + "." + material + ".worst", *std::max_element(list.begin(), list.end()));
   }
 }

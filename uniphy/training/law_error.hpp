@@ -32,7 +32,4 @@ void report_errors(const Dataset& data, const std::vector<double>& values, const
 void report_law_errors(const Dataset& data, const std::vector<LawError>& errors,
                        const std::string& prefix, Metrics& metrics);
 
-/// The mean of the middle two where their number is even; NaN of none.
-double median(std::vector<double> values);
-
 }  // namespace uniphy
