@@ -5,7 +5,7 @@ set -euo pipefail
 packages=(
   build-essential cmake ninja-build ccache
   libtorch-dev libopenblas-dev libeigen3-dev libxsimd-dev
-  libhdf5-dev libyaml-cpp-dev nlohmann-json3-dev libtinyobjloader-dev
+  libhdf5-dev libyaml-cpp-dev nlohmann-json3-dev
   libcli11-dev libspdlog-dev libfmt-dev
   libgtest-dev libgmock-dev libbenchmark-dev
   gnuplot-nox  # the charts and pictures of the reports

@@ -4,6 +4,7 @@
 
 #include "ops/kernels/base/error.hpp"
 #include "uniphy/config/document.hpp"
+#include "uniphy/io/text_lines.hpp"
 
 namespace uniphy {
 namespace {
@@ -11,29 +12,6 @@ namespace {
 [[noreturn]] void fail(const std::string& name, int line, const std::string& message) {
   throw Error(line > 0 ? fmt::format("{}:{}: {}", name, line, message)
                        : fmt::format("{}: {}", name, message));
-}
-
-/// Length of the UTF-8 sequence at text[i], 0 where it is malformed (overlong forms, surrogates and
-/// code points above U+10FFFF included).
-std::size_t utf8_length(const std::string& text, std::size_t i) {
-  const auto byte = [&](std::size_t k) {
-    return k < text.size() ? static_cast<unsigned char>(text[k]) : 0u;
-  };
-  const auto follows = [&](std::size_t k) { return (byte(k) & 0xC0u) == 0x80u; };
-  const unsigned first = byte(i);
-  if (first < 0x80) return 1;
-  if (first >= 0xC2 && first <= 0xDF) return follows(i + 1) ? 2 : 0;
-  if (first >= 0xE0 && first <= 0xEF) {
-    if (!follows(i + 1) || !follows(i + 2)) return 0;
-    if (first == 0xE0 && byte(i + 1) < 0xA0) return 0;
-    return first == 0xED && byte(i + 1) > 0x9F ? 0 : 3;
-  }
-  if (first >= 0xF0 && first <= 0xF4) {
-    if (!follows(i + 1) || !follows(i + 2) || !follows(i + 3)) return 0;
-    if (first == 0xF0 && byte(i + 1) < 0x90) return 0;
-    return first == 0xF4 && byte(i + 1) > 0x8F ? 0 : 4;
-  }
-  return 0;
 }
 
 }  // namespace

@@ -1,13 +1,21 @@
 #include "uniphy/geometry/particle_cloud.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <numeric>
+
 #include "ops/kernels/base/error.hpp"
-#include "uniphy/geometry/text_file.hpp"
+#include "uniphy/io/atomic_file.hpp"
 #include "uniphy/io/hdf5.hpp"
+#include "uniphy/io/text_lines.hpp"
 
 namespace uniphy {
 namespace {
 
 using Eigen::Vector3d;
+
+constexpr std::size_t kMaximumBytes = std::size_t{1} << 30;
 
 ParticleCloud read_particles_hdf5(const std::filesystem::path& file, std::int64_t frame) {
   const hdf5::Reader reader(file);
@@ -53,35 +61,47 @@ Bounds bounds_of(const std::vector<Vector3d>& points) {
 ParticleCloud parse_particles(const std::string& text, const std::string& name) {
   ParticleCloud cloud;
   bool first = true;
-  for_each_line(text, [&](std::int64_t number, std::string_view line) {
-    const std::vector<std::string_view> words = split_words(line, " \t,;");
-    if (words.empty() || words[0][0] == '#') return;
-    const auto fail = [&](const std::string& message) {
-      throw Error(name + ":" + std::to_string(number) + ": " + message);
-    };
+  TextLines lines(text, name);
+  while (lines.next()) {
+    const std::vector<std::string_view> words = lines.words(" \t,;");
+    if (words.empty() || words[0][0] == '#') continue;
     if (words.size() != 3) {
-      fail("expected 3 coordinates, found " + std::to_string(words.size()) + " columns");
+      lines.fail("expected 3 coordinates, found " + std::to_string(words.size()) + " columns");
     }
-    Vector3d p;
-    int read = 0;
-    while (read < 3 && parse_number(words[read], &p[read])) ++read;
-    const bool column_names = first && words[0].find_first_of("0123456789") == words[0].npos &&
-                              words[0] != "nan" && words[0] != "inf";
+    double unused;
+    const bool is_text = std::none_of(words.begin(), words.end(), [&](std::string_view word) {
+      return parse_number(word, &unused) || word == "nan" || word == "inf";
+    });
+    if (first && is_text && words[0].find_first_of("0123456789") == words[0].npos) {
+      first = false;
+      continue;  // the names of the columns
+    }
     first = false;
-    if (read < 3) {
-      if (column_names && read == 0) return;
-      fail("expected a finite number, found \"" + std::string(words[read]) + "\"");
-    }
+    Vector3d p;
+    for (int axis = 0; axis < 3; ++axis) p[axis] = lines.number(words[axis], "");
     cloud.x.push_back(p);
-  });
+  }
   if (cloud.x.empty()) throw Error(name + ": no particles: expected lines \"x y z\"");
   return cloud;
+}
+
+std::string odd_scale(const ParticleCloud& cloud, const std::vector<double>& volume) {
+  const Bounds bounds = cloud.bounds();
+  const double longest = bounds.largest_side();
+  double sum = std::accumulate(volume.begin(), volume.end(), 0.0);
+  if (volume.size() == 1) sum *= static_cast<double>(cloud.x.size());
+  const double box = bounds.sides().prod(), cube = longest * longest * longest;
+  if (cloud.x.size() < 2 || (sum <= 10 * cube && sum >= 1e-4 * box)) return "";
+  return fmt::format(
+      "the particles together have a volume of {:.3g}, their bounding box of {:.3g} "
+      "is {:.3g} long: are both in the same unit?",
+      sum, box, longest);
 }
 
 ParticleCloud read_particles(const std::filesystem::path& file, std::int64_t frame) {
   const std::string extension = file.extension().string();
   if (extension == ".h5" || extension == ".hdf5") return read_particles_hdf5(file, frame);
-  return parse_particles(read_text_file(file), file.string());
+  return parse_particles(read_text_file(file, kMaximumBytes), file.string());
 }
 
 }  // namespace uniphy

@@ -27,6 +27,11 @@ struct ParticleCloud {
 /// with # are skipped, and one line of column names may stand first. Throws Error naming the file
 /// and the line or dataset.
 ParticleCloud read_particles(const std::filesystem::path& file, std::int64_t frame = 0);
+/// What is odd about the scale of a cloud whose particles have `volume` (one number for all where
+/// the file has none), or "": the particles together are larger than ten cubes of its longest side,
+/// or less than 1e-4 of its bounding box. Positions in millimetres beside volumes in cubic metres
+/// are off by 1e9.
+std::string odd_scale(const ParticleCloud& cloud, const std::vector<double>& volume);
 /// The text form; `name` stands for the file in messages.
 ParticleCloud parse_particles(const std::string& text, const std::string& name);
 

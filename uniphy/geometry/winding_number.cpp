@@ -97,14 +97,14 @@ double WindingNumber::exact(const Vector3d& p) const {
   return sum / (4 * M_PI);
 }
 
-MeshSolid::MeshSolid(const TriangleMesh& mesh)
-    : winding_(mesh), bounds_(mesh.bounds()), volume_(std::abs(mesh.signed_volume())) {}
+MeshSolid::MeshSolid(const ClosedSurface& surface)
+    : winding_(surface.mesh), bounds_(surface.mesh.bounds()), volume_(surface.volume) {}
 
 bool MeshSolid::inside(const Vector3d& p) const {
   if ((p.array() < bounds_.min.array()).any() || (p.array() > bounds_.max.array()).any()) {
     return false;
   }
-  return std::abs(winding_(p)) > 0.5;
+  return winding_(p) > 0.5;
 }
 
 }  // namespace uniphy

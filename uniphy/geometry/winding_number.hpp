@@ -3,13 +3,13 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "uniphy/geometry/triangle_mesh.hpp"
+#include "uniphy/geometry/polygon_mesh.hpp"
 
 namespace uniphy {
 
 /// Generalized winding number of a triangle surface (A. Jacobson et al. 2013): 1/(4π) times the
-/// solid angle that the surface covers seen from a point, ±1 inside and 0 outside a closed surface,
-/// and smoothly between the two where the surface has holes, so that > ½ still tells inside.
+/// solid angle that the surface covers seen from a point: 1 inside and 0 outside a closed surface
+/// that looks outwards, more where parts overlap, 0 in a cavity.
 ///
 /// Far groups of triangles count as one dipole, Σ area·normal · (c − p)/(4π |c − p|³) (G. Barill et
 /// al. 2018, "Fast Winding Numbers for Soups and Clouds", first order), so that a query costs
@@ -43,10 +43,10 @@ class WindingNumber {
   double accuracy_;
 };
 
-/// The inside of a surface that may have small holes: |winding number| > ½.
+/// The inside of a surface, the union of its parts: winding number > ½.
 class MeshSolid final : public Solid {
  public:
-  explicit MeshSolid(const TriangleMesh& mesh);
+  explicit MeshSolid(const ClosedSurface& surface);
   bool inside(const Eigen::Vector3d& p) const override;
   Bounds bounds() const override { return bounds_; }
   double volume() const override { return volume_; }

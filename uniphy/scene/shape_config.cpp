@@ -1,6 +1,7 @@
 #include "uniphy/scene/shape_config.hpp"
 
 #include <array>
+#include <cstdio>
 #include <utility>
 
 #include "ops/kernels/base/error.hpp"
@@ -136,7 +137,11 @@ ShapeLoader read_pawn(Section& s) {
 ShapeLoader read_mesh(Section& s) {
   const auto file = s.input_file("file", required, "Wavefront OBJ file");
   return [file](BodyDescription* body) {
-    body->solid = std::make_shared<const MeshSolid>(read_obj(file));
+    const ClosedSurface surface = close_surface(read_obj(file));
+    for (const std::string& text : surface.warnings) {
+      std::fprintf(stderr, "warning: %s\n", text.c_str());
+    }
+    body->solid = std::make_shared<const MeshSolid>(surface);
   };
 }
 
@@ -148,9 +153,18 @@ ShapeLoader read_cloud(Section& s) {
   const double volume = s.real("particle_volume", 0, at_least(0), "m^3",
                                "volume of each particle before scaling, where the file has none");
   const bool in_place = s.boolean(
-      "in_place", false, "keep the positions of the file: center, rotation and size are not used");
+      "in_place", false, "keep the positions of the file, in place of center, rotation and size");
   return [=](BodyDescription* body) {
     body->cloud = std::make_shared<const ParticleCloud>(read_particles(file, frame));
+    if (volume > 0 && !body->cloud->volume.empty()) {
+      throw Error(file.string() + ": expected /volume or particle_volume, found both");
+    }
+    const ParticleCloud& cloud = *body->cloud;
+    if (volume > 0 || !cloud.volume.empty()) {
+      const std::string odd =
+          odd_scale(cloud, volume > 0 ? std::vector<double>{volume} : cloud.volume);
+      if (!odd.empty()) std::fprintf(stderr, "warning: %s: %s\n", file.c_str(), odd.c_str());
+    }
     body->particle_volume = volume;
     body->in_place = in_place;
   };

@@ -1,13 +1,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
+#include <string>
+#include <vector>
 
 #include "ops/kernels/base/error.hpp"
 #include "uniphy/geometry/fill.hpp"
+#include "uniphy/geometry/polygon_mesh.hpp"
 #include "uniphy/geometry/random.hpp"
-#include "uniphy/geometry/triangle_mesh.hpp"
 #include "uniphy/geometry/winding_number.hpp"
 
 namespace uniphy {
@@ -24,10 +26,10 @@ const char* const kCube =
     "f 1 4 3 2\nf 5//1 6//1 7//1 8//1\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
 
 // Sphere of radius 1 from rings of triangles; without its first `open` rings at the pole.
-TriangleMesh sphere_mesh(int rings, int around, int open = 0) {
-  TriangleMesh mesh;
+PolygonMesh sphere_mesh(int rings, int around, int open = 0) {
+  PolygonMesh mesh;
   for (int i = 0; i <= rings; ++i) {
-    for (int j = 0; j < around; ++j) {
+    for (int j = 0; j < (i == 0 || i == rings ? 1 : around); ++j) {
       const double polar = M_PI * i / rings, round = 2 * M_PI * j / around;
       mesh.vertices.emplace_back(std::sin(polar) * std::cos(round), std::cos(polar),
                                  -std::sin(polar) * std::sin(round));
@@ -35,25 +37,40 @@ TriangleMesh sphere_mesh(int rings, int around, int open = 0) {
   }
   for (int i = open; i < rings; ++i) {
     for (int j = 0; j < around; ++j) {
-      const int a = i * around + j, b = i * around + (j + 1) % around;
-      const int c = a + around, d = b + around;
-      if (i > 0) mesh.triangles.push_back({a, c, b});
-      if (i < rings - 1) mesh.triangles.push_back({b, c, d});
+      const auto at = [&](int ring, int k) {
+        return ring == 0       ? 0
+               : ring == rings ? 1 + (rings - 1) * around
+                               : 1 + (ring - 1) * around + k;
+      };
+      const int next = (j + 1) % around;
+      if (i > 0) mesh.faces.push_back({at(i, j), at(i + 1, j), at(i, next)});
+      if (i < rings - 1) mesh.faces.push_back({at(i, next), at(i + 1, j), at(i + 1, next)});
     }
   }
   return mesh;
 }
 
+double volume(const std::string& text) {
+  const ClosedSurface surface = close_surface(parse_obj(text, "mesh.obj"));
+  EXPECT_TRUE(surface.warnings.empty()) << surface.warnings[0];
+  return surface.volume;
+}
+
 TEST(Obj, ReadsQuadrilateralsAndNegativeIndices) {
-  const TriangleMesh mesh = parse_obj(kCube, "cube.obj");
+  const PolygonMesh mesh = parse_obj(kCube, "cube.obj");
   EXPECT_EQ(mesh.vertices.size(), 8u);
-  EXPECT_EQ(mesh.triangles.size(), 12u);
-  EXPECT_NEAR(mesh.signed_volume(), 1, 1e-12);
-  const TriangleMesh tetrahedron = parse_obj(
-      "v 0 0 0\r\nv 1 0 0\r\nv 0 1 0\r\nv 0 0 1\r\nf -4 -2 -3\r\nf -4 -3 -1\r\nf -4 -1 -2\r\n"
-      "f -3 -2 -1\r\n",
-      "tetrahedron.obj");
-  EXPECT_NEAR(tetrahedron.signed_volume(), 1.0 / 6, 1e-12);
+  EXPECT_EQ(mesh.faces.size(), 6u);
+  EXPECT_EQ(mesh.lines, (std::vector<std::int64_t>{12, 13, 14, 15, 16, 17}));
+  EXPECT_NEAR(volume(kCube), 1, 1e-12);
+  EXPECT_NEAR(volume("v 0 0 0\r\nv 1 0 0\r\nv 0 1 0\r\nv 0 0 1\r\nf -4 -2 -3\r\nf -4 -3 -1\r\n"
+                     "f -4 -1 -2\r\nf -3 -2 -1\r\n"),
+              1.0 / 6, 1e-12);
+}
+
+TEST(Obj, ReadsLinesThatGoOn) {
+  std::string text = kCube;
+  text.replace(text.find("f 1 4 3 2"), 9, "f 1 4 \\\n3 2");
+  EXPECT_NEAR(volume(text), 1, 1e-12);
 }
 
 TEST(Obj, KeepsDoublePrecision) {
@@ -62,39 +79,27 @@ TEST(Obj, KeepsDoublePrecision) {
   EXPECT_EQ(parse_obj(text, "cube.obj").vertices[6][2], 1.0000000001);
 }
 
-TEST(Obj, DropsTrianglesWithoutArea) {
-  const TriangleMesh mesh = parse_obj(std::string(kCube) + "f 1 1 2\nf 1 2 2\n", "cube.obj");
-  EXPECT_EQ(mesh.triangles.size(), 12u);
+TEST(Obj, DropsFacesOfLessThanThreeCorners) {
+  EXPECT_EQ(parse_obj(std::string(kCube) + "f 1 1 2\nf 1 2 2\n", "cube.obj").faces.size(), 6u);
 }
 
 TEST(Obj, WeldsCornersThatEachFaceRepeats) {
   // As exporters write them: three vertices of its own for each face.
-  const TriangleMesh mesh = parse_obj(
-      "v 0 0 0\nv 0 1 0\nv 1 0 0\nf 1 2 3\nv 0 0 0\nv 1 0 0\nv 0 0 1\nf 4 5 6\n"
-      "v 0 0 0\nv 0 0 1\nv 0 1 0\nf 7 8 9\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 10 11 12\n",
-      "split.obj");
-  EXPECT_EQ(mesh.open_edges().size(), 0u);
-  EXPECT_NEAR(mesh.signed_volume(), 1.0 / 6, 1e-12);
-}
-
-TEST(TriangleMesh, VolumeClosesHolesFlat) {
-  std::string text = kCube;
-  text.resize(text.find("f 4 1 5 8"));
-  const TriangleMesh open = parse_obj(text, "cube.obj");
-  EXPECT_EQ(open.open_edges().size(), 4u);
-  EXPECT_NEAR(open.signed_volume(), 1, 1e-12);
+  EXPECT_NEAR(volume("v 0 0 0\nv 0 1 0\nv 1 0 0\nf 1 2 3\nv 0 0 0\nv 1 0 0\nv 0 0 1\nf 4 5 6\n"
+                     "v 0 0 0\nv 0 0 1\nv 0 1 0\nf 7 8 9\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
+                     "f 10 11 12\n"),
+              1.0 / 6, 1e-12);
 }
 
 TEST(WindingNumber, OfACube) {
-  const TriangleMesh mesh = parse_obj(kCube, "cube.obj");
-  const WindingNumber winding(mesh);
+  const WindingNumber winding(close_surface(parse_obj(kCube, "cube.obj")).mesh);
   EXPECT_NEAR(winding({0.5, 0.5, 0.5}), 1, 1e-12);
   EXPECT_NEAR(winding({0.01, 0.99, 0.5}), 1, 1e-12);
   EXPECT_NEAR(winding({-0.01, 0.5, 0.5}), 0, 1e-12);
 }
 
 TEST(WindingNumber, TreeAgreesWithTheSum) {
-  const TriangleMesh mesh = sphere_mesh(40, 60);
+  const TriangleMesh mesh = close_surface(sphere_mesh(40, 60)).mesh;
   const WindingNumber winding(mesh);
   UniformRandom random(1);
   for (int trial = 0; trial < 500; ++trial) {
@@ -108,8 +113,9 @@ TEST(WindingNumber, TreeAgreesWithTheSum) {
 }
 
 TEST(MeshSolid, InsideOfASphereSurvivesSmallHoles) {
-  const MeshSolid closed(sphere_mesh(40, 60));
-  const MeshSolid pierced(sphere_mesh(40, 60, 3));  // without the cap of 13.5 degrees
+  const MeshSolid closed(close_surface(sphere_mesh(40, 60)));
+  const MeshSolid pierced(
+      close_surface(sphere_mesh(40, 60, 3)));  // without the cap of 13.5 degrees
   UniformRandom random(2);
   int differences = 0;
   for (int trial = 0; trial < 20000; ++trial) {
@@ -125,22 +131,24 @@ TEST(MeshSolid, InsideOfASphereSurvivesSmallHoles) {
 }
 
 TEST(MeshSolid, OrientationDoesNotMatter) {
-  TriangleMesh mesh = parse_obj(kCube, "cube.obj");
-  for (auto& triangle : mesh.triangles) std::swap(triangle[0], triangle[1]);
-  const MeshSolid solid(mesh);
+  PolygonMesh mesh = parse_obj(kCube, "cube.obj");
+  for (auto& face : mesh.faces) std::reverse(face.begin(), face.end());
+  const ClosedSurface surface = close_surface(mesh);
+  EXPECT_TRUE(surface.warnings.empty());
+  const MeshSolid solid(surface);
   EXPECT_TRUE(solid.inside({0.5, 0.5, 0.5}));
   EXPECT_FALSE(solid.inside({1.5, 0.5, 0.5}));
   EXPECT_NEAR(solid.volume(), 1, 1e-12);
 }
 
 TEST(MeshSolid, ParticlesOfACubeAreThoseOfTheBox) {
-  EXPECT_EQ(fill_lattice(MeshSolid(parse_obj(kCube, "cube.obj")), 8).size(), 512u);
+  EXPECT_EQ(fill_lattice(MeshSolid(close_surface(parse_obj(kCube, "cube.obj"))), 8).size(), 512u);
 }
 
 TEST(MeshSolid, FillsASphereOfAHundredThousandTriangles) {
-  const TriangleMesh mesh = sphere_mesh(224, 224);
-  ASSERT_GE(mesh.triangles.size(), 99000u);
-  const MeshSolid solid(mesh);
+  const PolygonMesh mesh = sphere_mesh(224, 224);
+  ASSERT_GE(mesh.faces.size(), 99000u);
+  const MeshSolid solid(close_surface(mesh));
   const std::vector<Vector3d> points = fill_lattice_nearest(solid, 5000);
   EXPECT_NEAR(points.size(), 5000, 900);
   for (const Vector3d& p : points) ASSERT_LT(p.norm(), 1);
@@ -156,7 +164,7 @@ class RefusedObj : public testing::TestWithParam<BadObj> {};
 
 TEST_P(RefusedObj, SaysWhatIsWrong) {
   try {
-    parse_obj(GetParam().text, "mesh.obj");
+    close_surface(parse_obj(GetParam().text, "mesh.obj"));
     FAIL() << "expected an Error";
   } catch (const Error& error) {
     EXPECT_THAT(error.what(), HasSubstr("mesh.obj"));
@@ -184,10 +192,11 @@ INSTANTIATE_TEST_SUITE_P(
                "found \"99999999999999999999\""},
         BadObj{"short_face", "v 0 0 0\nv 1 0 0\nf 1 2\n", "at least 3 vertices, found 2"},
         BadObj{"degenerate", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n",
-               "all 1 triangles are degenerate"},
-        BadObj{"one_triangle", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "enclose no volume"},
+               "mesh.obj:4: the faces from here on have no area"},
+        BadObj{"degenerate_all", "v 0 0 0\nv 1 0 0\nf 1 2 2\n", "all 1 faces are degenerate"},
+        BadObj{"one_triangle", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "encloses no volume"},
         BadObj{"flat_sheet", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n",
-               "enclose no volume"},
+               "encloses no volume"},
         BadObj{"binary", "\x7f\x45\x4c\x46\x02\x01", "no vertices"}),
     [](const auto& info) { return info.param.name; });
 

@@ -82,6 +82,32 @@ TEST_F(ParticleFile, ReadsTextFiles) {
   EXPECT_TRUE(cloud.volume.empty());
 }
 
+TEST_F(ParticleFile, ReadsTextOfEverySystem) {
+  const ParticleCloud expected = parse_particles("1 2 3\n4 5 6\n", "p");
+  for (const char* text :
+       {"\xef\xbb\xbf"
+        "1;2;3\r\n4;5;6\r\n",
+        "\xef\xbb\xbfx;y;z\n1;2;3\n4;5;6", "1,2,3\r4,5,6\r", "\tx\ty\tz\n1\t2\t3\n4\t5\t6\n"}) {
+    EXPECT_EQ(parse_particles(text, "p").x, expected.x) << text;
+  }
+}
+
+TEST(ParticleCloud, SaysWhereVolumesAndPositionsHaveTwoUnits) {
+  ParticleCloud cloud;
+  for (int k = 0; k < 1000; ++k) {
+    cloud.x.emplace_back(0.01 * (k % 10), 0.01 * (k / 10 % 10), 0.01 * (k / 100));
+  }
+  EXPECT_EQ(odd_scale(cloud, {1e-6}), "");
+  EXPECT_EQ(odd_scale(cloud, std::vector<double>(1000, 1e-6)), "");
+  EXPECT_EQ(odd_scale(cloud, {1e3}),
+            "the particles together have a volume of 1e+06, their bounding box of 0.000729 is 0.09 "
+            "long: are both in the same unit?");
+  EXPECT_THAT(odd_scale(cloud, {1e-15}), HasSubstr("volume of 1e-12"));
+  // A sheet has no bounding box to speak of.
+  for (Vector3d& x : cloud.x) x[2] = 0;
+  EXPECT_EQ(odd_scale(cloud, {1e-6}), "");
+}
+
 struct BadText {
   const char* name;
   const char* text;
@@ -109,7 +135,13 @@ INSTANTIATE_TEST_SUITE_P(
                     BadText{"not_finite", "1 nan 3\n", "expected a finite number, found \"nan\""},
                     BadText{"not_finite_first", "nan nan nan\n", "found \"nan\""},
                     BadText{"not_a_number", "1 2 3\nx y z\n", ":2: expected a finite number"},
-                    BadText{"half_a_number", "1 2 3m\n", "found \"3m\""}),
+                    BadText{"half_a_number", "1 2 3m\n", "found \"3m\""},
+                    BadText{"decimal_commas", "0,1;0,2;0,3\n",
+                            ":1: expected 3 coordinates, found 6"},
+                    BadText{"utf_16",
+                            "\xff\xfe"
+                            "1",
+                            "expected text in ASCII or UTF-8"}),
     [](const auto& info) { return info.param.name; });
 
 }  // namespace

@@ -121,7 +121,8 @@ TEST(Overlap, RefusesSolidsThatShareSpace) {
 
 TEST(Overlap, SeesMeshes) {
   std::filesystem::current_path(UNIPHY_SOURCE_DIR);
-  const auto star = std::make_shared<MeshSolid>(read_obj("configs/simulate/star.obj"));
+  const auto star =
+      std::make_shared<MeshSolid>(close_surface(read_obj("configs/simulate/star.obj")));
   const auto big = body("star", star, {0.5, 0.5, 0.5}, 0.4, lattice(500));
   EXPECT_THAT(overlap(big, body("ball", kBall, {0.5, 0.5, 0.5}, 0.05, lattice(100))),
               HasSubstr("overlap"));
