@@ -3,8 +3,11 @@
 #include <torch/torch.h>
 
 #include <array>
+#include <cerrno>
+#include <cstring>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <system_error>
 #include <vector>
 
@@ -181,13 +184,20 @@ void save_script_law(const fs::path& file, const kernels::LearnedLawWeights& wei
        {{"project", "F [P, 3, 3], z [Z] or [P, Z] -> F_proj [P, 3, 3]"},
         {"stress",
          "F_proj [P, 3, 3], C [P, 3, 3] in 1/s, z -> Kirchhoff stress [P, 3, 3] in Pa"}}}};
+  // To memory first: LibTorch's own file writer ends the program where the disk is full.
+  std::ostringstream bytes;
+  module.save(bytes, {{"metadata.json", metadata.dump(2)}});
   const fs::path temporary = file.string() + ".tmp";
-  try {
-    module.save(temporary.string(), {{"metadata.json", metadata.dump(2)}});
-  } catch (const c10::Error& e) {
-    throw Error(file.string() + ": cannot write: " + first_line(e));
-  }
   std::error_code error;
+  errno = 0;
+  std::ofstream stream(temporary, std::ios::binary | std::ios::trunc);
+  stream << bytes.str();
+  stream.close();
+  if (!stream) {
+    const std::string reason = std::strerror(errno);
+    fs::remove(temporary, error);
+    throw Error(file.string() + ": cannot write: " + reason);
+  }
   fs::rename(temporary, file, error);
   if (error) throw Error(file.string() + ": cannot write: " + error.message());
 }

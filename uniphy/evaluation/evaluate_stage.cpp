@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <fstream>
 
 #include "ops/kernels/base/error.hpp"
 #include "uniphy/evaluation/heldout_stage.hpp"
+#include "uniphy/io/atomic_file.hpp"
 #include "uniphy/report/plot.hpp"
 #include "uniphy/scene/comparison.hpp"
 
@@ -14,13 +14,12 @@ namespace uniphy {
 namespace {
 
 void write_curve(const TrajectoryComparison& comparison, const std::filesystem::path& file) {
-  std::ofstream stream(file);
-  stream << "time_s,mse_m2,root_m\n";
+  std::string text = "time_s,mse_m2,root_m\n";
   for (std::size_t frame = 0; frame < comparison.time.size(); ++frame) {
     const double mse = comparison.frame_mse[frame];
-    stream << fmt::format("{},{},{}\n", comparison.time[frame], mse, std::sqrt(mse));
+    text += fmt::format("{},{},{}\n", comparison.time[frame], mse, std::sqrt(mse));
   }
-  if (!stream.flush()) throw Error(file.string() + ": cannot be written");
+  write_text_file(file, text);
 }
 
 void plot_curve(const TrajectoryComparison& comparison, const std::filesystem::path& file) {

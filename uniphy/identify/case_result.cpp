@@ -6,6 +6,7 @@
 #include "uniphy/inference/infer_run.hpp"
 #include "uniphy/io/hdf5.hpp"
 #include "uniphy/io/observation.hpp"
+#include "uniphy/io/seal.hpp"
 
 namespace uniphy {
 namespace {
@@ -42,7 +43,7 @@ void write_case_result(const std::filesystem::path& folder, const CaseResult& re
   const std::vector<double>& best = result.pictures.best;
   writer.write("best", best, {static_cast<std::int64_t>(best.size())},
                {"m^2", "best loss so far within each stage, over the roll-outs of the result"});
-  writer.commit();
+  writer.commit_sealed();
 }
 
 std::optional<CaseResult> read_case_result(const std::filesystem::path& folder,
@@ -51,6 +52,7 @@ std::optional<CaseResult> read_case_result(const std::filesystem::path& folder,
   const hdf5::Reader reader(folder / kFile);
   reader.check_format(kFormat, 1);
   if (reader.attribute_text("/", "fingerprint") != fingerprint) return {};
+  check_seal(folder / kFile);
   CaseResult result;
   for (const auto& [name, text] : kTexts) result.row.*text = reader.attribute_text("/", name);
   for (const auto& [name, number] : kNumbers) result.row.*number = reader.attribute_real("/", name);

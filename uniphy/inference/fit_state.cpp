@@ -5,6 +5,7 @@
 #include "ops/kernels/base/error.hpp"
 #include "uniphy/inference/fit.hpp"
 #include "uniphy/io/hdf5.hpp"
+#include "uniphy/io/seal.hpp"
 
 namespace uniphy {
 namespace {
@@ -75,7 +76,7 @@ void write_fit_state(const std::filesystem::path& file, const FitState& state,
       {"1", "start, loss, mse, reference, stalled, centre, linear, angular, u, optimizer"});
   writer.write("history", history.data, history.shape,
                {"1", "stage, candidate, epoch, horizon (s), mse (m^2)"});
-  writer.commit();
+  writer.commit_sealed();
 }
 
 FitState read_fit_state(const std::filesystem::path& file, const std::string& fingerprint) {
@@ -88,6 +89,7 @@ FitState read_fit_state(const std::filesystem::path& file, const std::string& fi
                             "configuration has changed since; remove the file to start anew",
                             fingerprint, found));
   }
+  check_seal(file);
   FitState state;
   state.stage = static_cast<int>(reader.attribute_integer("/", "stage"));
   state.epoch = static_cast<int>(reader.attribute_integer("/", "epoch"));

@@ -68,6 +68,8 @@ class Writer {
   /// Makes what was written so far safe in the temporary file (for very long runs).
   void flush();
   void commit();
+  /// The same for a file that a later run goes on from (seal.hpp).
+  void commit_sealed();
   const std::filesystem::path& file() const;
 
  private:
@@ -77,6 +79,11 @@ class Writer {
 
 /// Whether a reader accepts NaN and infinities.
 enum class Values { any, finite };
+
+/// Throws Error `file: object: ...` where a number is larger than `limit` either way: damage that
+/// would only show as something else, steps later.
+void check_magnitude(const class Reader& reader, const std::string& object,
+                     const std::vector<double>& data, double limit);
 
 /// Opens a file for reading. Before anything is allocated, the type class, the rank and the extents
 /// are checked, and the size is held against that of the file (a header that claims more data than
@@ -95,8 +102,8 @@ class Reader {
   std::vector<std::string> members(const std::string& group) const;
   Shape shape(const std::string& dataset) const;
 
-  /// T in {double, float, int32_t, int64_t}: floating-point types read floating-point datasets of
-  /// any precision, integers read integer datasets whose values fit.
+  /// T in {double, float, int32_t, int64_t}: floating-point types read numbers of any kind and
+  /// precision, integers read integer datasets whose values fit.
   template <class T>
   std::vector<T> read(const std::string& name, const Shape& expected,
                       Values values = Values::any) const;
@@ -109,8 +116,9 @@ class Reader {
 
   std::string attribute_text(const std::string& object, const std::string& name) const;
   double attribute_real(const std::string& object, const std::string& name) const;
+  /// A real number will do where it is whole.
   std::int64_t attribute_integer(const std::string& object, const std::string& name) const;
-  /// A rank-1 attribute of floating-point numbers; -1 accepts any count up to 4096.
+  /// A rank-1 attribute of numbers; -1 accepts any count up to 4096.
   std::vector<double> attribute_reals(const std::string& object, const std::string& name,
                                       std::int64_t count = -1) const;
 

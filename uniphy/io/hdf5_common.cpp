@@ -1,19 +1,39 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+
 #include "uniphy/io/hdf5_handle.hpp"
 
 namespace uniphy::hdf5 {
 
 std::string shape_text(const Shape& shape) { return fmt::format("[{}]", fmt::join(shape, ", ")); }
 
-void silence_hdf5() { H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr); }
+void prepare_hdf5() {
+  static const bool once = [] {
+    // Every file is closed by its reader or writer. Where that failed (a full disk) HDF5 would try
+    // again in its exit handler, and end the program with a segmentation fault.
+    H5dont_atexit();
+    return true;
+  }();
+  (void)once;
+  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+}
 
 std::string hdf5_reason() {
   std::string reason;
   const auto visit = [](unsigned, const H5E_error2_t* error, void* data) -> herr_t {
     auto& text = *static_cast<std::string*>(data);
-    if (text.empty() && error->desc) text = error->desc;
+    const std::string found = error->desc ? error->desc : "";
+    // What the system says stands within "errno = 28, error message = 'No space left on device'".
+    const std::string mark = "error message = '";
+    const std::size_t start = found.find(mark);
+    if (start != found.npos) {
+      text = found.substr(start + mark.size());
+      text.resize(std::min(text.size(), text.find('\'')));
+      return 1;
+    }
+    if (text.empty()) text = found;
     return 0;
   };
   H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, visit, &reason);

@@ -48,9 +48,11 @@ inline Handle object_handle(hid_t id) { return {id, H5Oclose}; }
 inline Handle file_handle(hid_t id) { return {id, H5Fclose}; }
 inline Handle group_handle(hid_t id) { return {id, H5Gclose}; }
 
-/// No printing of HDF5's own error stack: messages are made here.
-void silence_hdf5();
-/// The innermost message of HDF5's error stack, or "unknown HDF5 error".
+/// To be called before any other function: no printing of HDF5's own error stack (messages are made
+/// here) and no exit handler.
+void prepare_hdf5();
+/// Why the last call failed: what the system said, else the innermost message of HDF5's error
+/// stack, else "unknown HDF5 error". Every call of HDF5 forgets it.
 std::string hdf5_reason();
 /// UTF-8 text of at most `size` bytes, padded with zeros (H5T_VARIABLE: of any length). Files are
 /// written with fixed lengths, for HDF5 reads damaged variable-length text without care.

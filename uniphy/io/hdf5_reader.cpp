@@ -10,6 +10,7 @@
 #include "ops/kernels/base/error.hpp"
 #include "uniphy/io/hdf5_handle.hpp"
 #include "uniphy/io/hdf5_reader_impl.hpp"
+#include "uniphy/io/text_lines.hpp"
 
 namespace uniphy::hdf5 {
 namespace {
@@ -78,7 +79,7 @@ Shape Reader::Impl::shape_of(const std::string& name, const Handle& set) const {
 }
 
 Reader::Reader(const std::filesystem::path& file) : impl_(std::make_unique<Impl>()) {
-  silence_hdf5();
+  prepare_hdf5();
   impl_->path = file;
   const auto refuse = [&](const std::string& message) {
     throw Error(fmt::format("{}: {}", file.string(), message));
@@ -144,10 +145,10 @@ std::vector<T> Reader::Impl::read(const std::string& name, const Shape& expected
                                   std::int64_t first, std::int64_t rows, Values values) const {
   const Handle set = open(name);
   const Handle type = datatype(H5Dget_type(set));
-  const H5T_class_t wanted = is_real<T> ? H5T_FLOAT : H5T_INTEGER;
-  if (!type.valid() || H5Tget_class(type) != wanted) {
-    fail(name, fmt::format("expected {}, found {}",
-                           is_real<T> ? "floating-point numbers" : "integers", type_text(type)));
+  const H5T_class_t found = type.valid() ? H5Tget_class(type) : H5T_NO_CLASS;
+  if (found != H5T_INTEGER && !(is_real<T> && found == H5T_FLOAT)) {
+    fail(name, fmt::format("expected {}, found {}", is_real<T> ? "numbers" : "integers",
+                           type_text(type)));
   }
   const Shape shape = shape_of(name, set);
   if (!fits(shape, expected)) {
@@ -222,6 +223,16 @@ std::vector<T> Reader::read_rows(const std::string& name, const Shape& expected,
   return impl_->read<T>(rooted(name), expected, first, std::max<std::int64_t>(count, 0), values);
 }
 
+void check_magnitude(const Reader& reader, const std::string& object,
+                     const std::vector<double>& data, double limit) {
+  for (std::size_t i = 0; i < data.size(); ++i) {
+    if (std::abs(data[i]) <= limit) continue;
+    reader.fail(object, fmt::format("expected numbers of at most {:g} either way, found {} at "
+                                    "position {}",
+                                    limit, data[i], i));
+  }
+}
+
 std::vector<std::string> Reader::read_strings(const std::string& name, std::int64_t count) const {
   const std::string full = rooted(name);
   const Handle set = impl_->open(full);
@@ -259,6 +270,10 @@ std::vector<std::string> Reader::read_strings(const std::string& name, std::int6
       const char* text = buffer.data() + i * width;
       texts.emplace_back(text, strnlen(text, width));
     }
+  }
+  for (const std::string& text : texts) {
+    if (is_utf8(text)) continue;
+    impl_->fail(full, fmt::format("expected UTF-8 text, found {}", quoted_word(text)));
   }
   return texts;
 }

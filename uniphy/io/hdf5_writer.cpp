@@ -8,6 +8,7 @@
 #include "ops/kernels/base/error.hpp"
 #include "uniphy/io/atomic_file.hpp"
 #include "uniphy/io/hdf5_handle.hpp"
+#include "uniphy/io/seal.hpp"
 
 namespace uniphy::hdf5 {
 namespace {
@@ -28,6 +29,7 @@ hsize_t chunk_rows(std::int64_t row_bytes) {
 struct Writer::Impl {
   std::filesystem::path path;
   std::filesystem::path temporary;
+  bool made = false;  ///< the temporary file
   Handle file;
   struct Extendible {
     Handle set;
@@ -37,11 +39,17 @@ struct Writer::Impl {
   std::map<std::string, Extendible> extendible;
 
   ~Impl() {
-    if (!file.valid()) return;
     extendible.clear();
     file.reset();
-    std::error_code ignored;
-    std::filesystem::remove(temporary, ignored);
+    std::error_code ignored;  // not there after commit()
+    if (made) std::filesystem::remove(temporary, ignored);
+  }
+
+  /// Everything to the file, and the file closed.
+  void finish() {
+    for (auto& [name, dataset] : extendible) close(dataset.set, name);
+    if (H5Fflush(file, H5F_SCOPE_GLOBAL) < 0) fail_hdf5("/", "written");
+    close(file, "/");
   }
 
   [[noreturn]] void fail(const std::string& name, const std::string& message) const {
@@ -49,6 +57,10 @@ struct Writer::Impl {
   }
   [[noreturn]] void fail_hdf5(const std::string& name, const std::string& doing) const {
     fail(name, fmt::format("cannot be {}: {}", doing, hdf5_reason()));
+  }
+  /// Data may reach the disk as late as here.
+  void close(Handle& handle, const std::string& name) const {
+    if (!handle.reset()) fail_hdf5(name, "written");
   }
 
   void set_text(const std::string& object, const std::string& name, const std::string& value) {
@@ -61,12 +73,13 @@ struct Writer::Impl {
     if (H5Aexists_by_name(file, object.c_str(), name.c_str(), H5P_DEFAULT) > 0) {
       H5Adelete_by_name(file, object.c_str(), name.c_str(), H5P_DEFAULT);
     }
-    const Handle attribute =
+    Handle attribute =
         attribute_handle(H5Acreate_by_name(file, object.c_str(), name.c_str(), file_type, space,
                                            H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
     if (!attribute.valid() || H5Awrite(attribute, memory_type, data) < 0) {
       fail_hdf5(fmt::format("attribute {} of {}", name, object), "written");
     }
+    close(attribute, fmt::format("attribute {} of {}", name, object));
   }
 
   /// Makes the group and those above it, where they are not there yet.
@@ -77,9 +90,10 @@ struct Writer::Impl {
       slash = name.find('/', slash + 1);
       const std::string part = name.substr(0, slash);
       if (H5Lexists(file, part.c_str(), H5P_DEFAULT) > 0) continue;
-      const Handle group =
+      Handle group =
           group_handle(H5Gcreate2(file, part.c_str(), H5P_DEFAULT, properties, H5P_DEFAULT));
       if (!group.valid()) fail_hdf5(part, "made");
+      close(group, part);
     }
   }
 
@@ -106,7 +120,7 @@ struct Writer::Impl {
 };
 
 Writer::Writer(const std::filesystem::path& file) : impl_(std::make_unique<Impl>()) {
-  silence_hdf5();
+  prepare_hdf5();
   impl_->path = file;
   impl_->temporary = temporary_name(file);
   std::error_code ignored;
@@ -124,8 +138,10 @@ Writer::Writer(const std::filesystem::path& file) : impl_(std::make_unique<Impl>
   impl_->file = file_handle(H5Fcreate(impl_->temporary.c_str(), H5F_ACC_TRUNC, creation, access));
   if (!impl_->file.valid()) {
     const std::string reason = errno ? std::strerror(errno) : hdf5_reason();
+    std::filesystem::remove(impl_->temporary, ignored);
     throw Error(fmt::format("{}: cannot be written: {}", file.string(), reason));
   }
+  impl_->made = true;
 }
 Writer::~Writer() = default;
 Writer::Writer(Writer&&) noexcept = default;
@@ -148,10 +164,11 @@ void Writer::write(const std::string& name, const T* data, const Shape& shape, c
   const Handle space = dataspace(
       shape.empty() ? H5Screate(H5S_SCALAR)
                     : H5Screate_simple(static_cast<int>(size.size()), size.data(), nullptr));
-  const Handle set = impl_->create(full, native_type<T>(), space, chunk, info);
+  Handle set = impl_->create(full, native_type<T>(), space, chunk, info);
   if (count > 0 && H5Dwrite(set, native_type<T>(), H5S_ALL, H5S_ALL, H5P_DEFAULT, data) < 0) {
     impl_->fail_hdf5(full, "written");
   }
+  impl_->close(set, full);
 }
 
 template <class T>
@@ -174,7 +191,7 @@ void Writer::write_strings(const std::string& name, const std::vector<std::strin
   std::size_t width = 1;
   for (const std::string& text : data) width = std::max(width, text.size());
   const Handle type = text_type(width);
-  const Handle set = impl_->create(full, type, space, {}, info);
+  Handle set = impl_->create(full, type, space, {}, info);
   std::string padded;
   for (const std::string& text : data) {
     padded += text;
@@ -183,6 +200,7 @@ void Writer::write_strings(const std::string& name, const std::vector<std::strin
   if (!data.empty() && H5Dwrite(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, padded.data()) < 0) {
     impl_->fail_hdf5(full, "written");
   }
+  impl_->close(set, full);
 }
 
 template <class T>
@@ -270,17 +288,13 @@ void Writer::flush() {
 }
 
 void Writer::commit() {
-  bool good = true;
-  for (auto& entry : impl_->extendible) good = entry.second.set.reset() && good;
-  impl_->extendible.clear();
-  good = H5Fflush(impl_->file, H5F_SCOPE_GLOBAL) >= 0 && good;
-  good = impl_->file.reset() && good;
-  if (!good) {
-    const std::string reason = hdf5_reason();
-    std::error_code ignored;
-    std::filesystem::remove(impl_->temporary, ignored);
-    impl_->fail("/", fmt::format("cannot be written: {}", reason));
-  }
+  impl_->finish();
+  replace_atomically(impl_->temporary, impl_->path);
+}
+
+void Writer::commit_sealed() {
+  impl_->finish();
+  seal_file(impl_->temporary, impl_->path);
   replace_atomically(impl_->temporary, impl_->path);
 }
 

@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstdio>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "ops/kernels/base/error.hpp"
@@ -57,6 +58,13 @@ const std::string& terminal() {
   return name;
 }
 
+/// Whether the file ends as every PNG does. gnuplot says nothing of a full disk.
+bool is_whole_png(const std::filesystem::path& file) {
+  static constexpr std::string_view kEnd("\0\0\0\0IEND\xae\x42\x60\x82", 12);
+  const std::string bytes = read_text_file(file);
+  return bytes.size() > kEnd.size() && bytes.substr(bytes.size() - kEnd.size()) == kEnd;
+}
+
 /// Removes the working files of one picture whatever happens.
 struct Cleanup {
   std::vector<std::filesystem::path> files;
@@ -94,7 +102,7 @@ bool run_gnuplot(const std::filesystem::path& png, int width, int height,
                   gnuplot_text(temporary.string()), script));
   const int code = spawn_gnuplot({source.string()}, log.string());
   std::error_code error;
-  if (code != 0 || std::filesystem::file_size(temporary, error) == 0 || error) {
+  if (code != 0 || !std::filesystem::exists(temporary, error)) {
     std::string reason = "unknown error";
     if (std::filesystem::exists(log, error)) {
       // gnuplot prints the line, a caret and then the reason, which is all that helps here.
@@ -104,6 +112,12 @@ bool run_gnuplot(const std::filesystem::path& png, int width, int height,
     }
     std::fprintf(stderr, "warning: %s: not drawn, gnuplot says: %s\n", png.c_str(), reason.c_str());
     return false;
+  }
+  if (!is_whole_png(temporary)) {
+    throw Error(
+        fmt::format("{}: cannot be written: gnuplot left a picture that is cut off (is the "
+                    "disk full?)",
+                    png.string()));
   }
   replace_atomically(temporary, png);
   return true;

@@ -2,49 +2,39 @@
 
 #include <fmt/format.h>
 
+#include <sstream>
+
 #include "ops/kernels/base/error.hpp"
+#include "ops/kernels/base/hash.hpp"
+#include "uniphy/io/seal.hpp"
 
 namespace uniphy {
 namespace {
 
-/// FNV-1a over the bytes of the numbers that decide the run.
-class Hash {
- public:
-  void add(const void* data, std::size_t bytes) {
-    const auto* at = static_cast<const unsigned char*>(data);
-    for (std::size_t i = 0; i < bytes; ++i) value_ = (value_ ^ at[i]) * 1099511628211ULL;
-  }
-  void add(const std::vector<double>& v) { add(v.data(), v.size() * sizeof(double)); }
-  std::uint64_t value() const { return value_; }
-
- private:
-  std::uint64_t value_ = 14695981039346656037ULL;
-};
-
 constexpr std::int64_t kHistoryColumns = 6;
 
 std::string fingerprint(const Dataset& data, const TrainingOptions& o, HeldoutCurve* heldout) {
-  Hash hash;
+  kernels::Hash hash;
   hash.add(data.samples.F);
   hash.add(data.samples.F_proj);
   hash.add(data.samples.C);
   hash.add(data.samples.tau);
-  hash.add(data.first.data(), data.first.size() * sizeof(data.first[0]));
+  hash.add(data.first);
   // The first codes of the held-out set follow from its samples.
   std::string beside;
   if (heldout) {
-    Hash codes;
+    kernels::Hash codes;
     const torch::Tensor z = heldout->z().detach().contiguous();
     codes.add(z.data_ptr(), z.nbytes());
-    beside = fmt::format(" heldout {:016x}", codes.value());
+    beside = " heldout " + codes.text();
   }
   return fmt::format(
       "{} {} caps {} moduli {} latent {} layers {} width {} seed {} steps {} batch {} rate {} x {} "
-      "decay {} sigma {} floor {} delta {} clip {} data {:016x}{}",
+      "decay {} sigma {} floor {} delta {} clip {} data {}{}",
       kernels::form_name(o.network.form), kernels::activation_name(o.network.activation),
       o.network.state_caps, o.network.state_moduli, o.network.latent_size, o.network.hidden_layers,
       o.network.width, o.seed, o.steps, o.batch_per_trajectory, o.learning_rate, o.latent_rate,
-      o.weight_decay, o.latent_sigma, o.error_floor, o.delta, o.clip, hash.value(), beside);
+      o.weight_decay, o.latent_sigma, o.error_floor, o.delta, o.clip, hash.text(), beside);
 }
 
 }  // namespace
@@ -89,29 +79,25 @@ void TrainingCheckpoint::save(std::int64_t step) const {
     heldout_->optimizer().save(heldout_moments);
     archive.write("heldout_optimizer", heldout_moments);
   }
-  const std::filesystem::path temporary = file_.string() + ".tmp";
-  try {
-    archive.save_to(temporary.string());
-    std::filesystem::rename(temporary, file_);
-  } catch (const std::exception& e) {
-    throw Error(file_.string() +
-                ": cannot write the training checkpoint: " + std::string(e.what()).substr(0, 200));
-  }
+  // To memory first: LibTorch's own file writer ends the program where the disk is full.
+  std::ostringstream bytes;
+  archive.save_to(bytes);
+  write_sealed_file(file_, bytes.str());
 }
 
 std::int64_t TrainingCheckpoint::load() {
   if (!std::filesystem::exists(file_)) return 0;
+  const std::string bytes = read_sealed_file(file_);
   torch::serialize::InputArchive archive;
   c10::IValue format, fingerprint, step;
   try {
-    archive.load_from(file_.string());
+    archive.load_from(bytes.data(), bytes.size());
     archive.read("format", format);
     archive.read("fingerprint", fingerprint);
     archive.read("step", step);
   } catch (const std::exception&) {
     throw Error(file_.string() +
-                ": expected a training checkpoint, found something else or a truncated file; "
-                "remove it to start anew");
+                ": expected a training checkpoint, found something else; remove it to start anew");
   }
   if (!format.isString() || format.toStringRef() != "uniphy-training" || !fingerprint.isString() ||
       !step.isInt())

@@ -56,5 +56,14 @@ TEST(AtomicFile, MakesDirectories) {
   EXPECT_FALSE(testing::error_of([&] { make_directory(scratch.file("file/below")); }).empty());
 }
 
+TEST(AtomicFile, NamesThatAreTooLongAreErrors) {
+  const testing::Scratch scratch;
+  const auto name = scratch.file(std::string(300, 'n'));
+  EXPECT_EQ(testing::error_of([&] { make_directory(name); }),
+            name.string() + ": cannot be made: File name too long");
+  EXPECT_EQ(testing::error_of([&] { write_text_file(name, "text"); }),
+            name.string() + ": cannot be written: File name too long");
+}
+
 }  // namespace
 }  // namespace uniphy
