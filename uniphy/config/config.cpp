@@ -60,6 +60,28 @@ void refuse_unread(const Node& given, const Node& resolved, const std::vector<st
   }
 }
 
+/// An override without a value takes a key back; one of a key that nobody knows is a slip.
+void refuse_unknown(const std::vector<std::string>& taken_back, const Node& resolved,
+                    const std::vector<std::string>& absent) {
+  for (const std::string& path : taken_back) {
+    if (std::find(absent.begin(), absent.end(), path) != absent.end()) continue;
+    const Node* node = &resolved;
+    for (std::size_t start = 0; node && start <= path.size();) {
+      const std::size_t end = std::min(path.find('.', start), path.size());
+      const std::string key = path.substr(start, end - start);
+      if (node->kind == Node::Kind::list) {
+        const auto index = parse_integer(key);
+        const bool there = index && *index >= 0 && *index < std::int64_t(node->items.size());
+        node = there ? node->items[std::size_t(*index)].get() : nullptr;
+      } else {
+        node = node->find(key).get();
+      }
+      start = end + 1;
+    }
+    if (!node) throw Error(fmt::format("--set {}=: {}: unknown key", path, path));
+  }
+}
+
 /// Words of `text` in lines of at most `width` columns.
 std::vector<std::string> wrap(const std::string& text, std::size_t width) {
   std::vector<std::string> lines(1);
@@ -71,6 +93,14 @@ std::vector<std::string> wrap(const std::string& text, std::size_t width) {
     start = end + 1;
   }
   return lines;
+}
+
+void apply_overrides(const std::vector<std::string>& overrides, Config::State& state) {
+  for (const std::string& assignment : overrides) {
+    if (!apply_override(*state.given, assignment)) {
+      state.taken_back.push_back(assignment.substr(0, assignment.find('=')));
+    }
+  }
 }
 
 }  // namespace
@@ -104,7 +134,7 @@ Config::Config(std::shared_ptr<State> state) : state_(std::move(state)) {
 Config Config::load(const std::filesystem::path& file, const std::vector<std::string>& overrides) {
   auto state = std::make_shared<State>();
   state->given = load_document(file);
-  for (const std::string& assignment : overrides) apply_override(*state->given, assignment);
+  apply_overrides(overrides, *state);
   return Config(state);
 }
 
@@ -112,7 +142,7 @@ Config Config::parse(const std::string& text, const std::string& name,
                      const std::vector<std::string>& overrides) {
   auto state = std::make_shared<State>();
   state->given = parse_document(text, name);
-  for (const std::string& assignment : overrides) apply_override(*state->given, assignment);
+  apply_overrides(overrides, *state);
   return Config(state);
 }
 
@@ -130,7 +160,9 @@ Section Config::root() const { return Section(state_, state_->given, state_->res
 bool Config::describing() const { return state_->describing; }
 
 void Config::finish() const {
-  if (!state_->describing) refuse_unread(*state_->given, *state_->resolved, state_->absent, "");
+  if (state_->describing) return;
+  refuse_unread(*state_->given, *state_->resolved, state_->absent, "");
+  refuse_unknown(state_->taken_back, *state_->resolved, state_->absent);
 }
 
 std::string Config::resolved() const { return emit_document(*state_->resolved); }

@@ -92,7 +92,7 @@ class Section {
   std::string choice(const std::string& key, Default<std::string> fallback,
                      const std::vector<std::string>& names, const std::string& doc);
   /// A path as written (relative to the working directory) of a file that must exist; an empty
-  /// default means "none" and is not checked.
+  /// default means none and is not checked, and "none" is read as it.
   std::filesystem::path input_file(const std::string& key, Default<std::string> fallback,
                                    const std::string& doc);
 
@@ -127,6 +127,10 @@ class Section {
                                    Default<std::vector<std::string>> fallback,
                                    const std::vector<std::string>& names, const std::string& doc,
                                    const Range& sizes = {});
+
+  /// For two keys that have been read and exclude each other: throws Error where both are given,
+  /// and leaves the one that does not count (`key`, where neither is given) out of resolved().
+  void one_of(const std::string& key, const std::string& other);
 
   /// A nested map; where it is absent all its keys take their defaults.
   Section section(const std::string& key, const std::string& doc);

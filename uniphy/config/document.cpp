@@ -6,6 +6,7 @@
 #include <yaml-cpp/mark.h>
 #include <yaml-cpp/parser.h>
 
+#include <algorithm>
 #include <sstream>
 
 #include "ops/kernels/base/error.hpp"
@@ -186,7 +187,7 @@ std::shared_ptr<Node> load_document(const std::filesystem::path& file) {
   return parse_document(read_text_file(file, kMaximumBytes), file.string());
 }
 
-void apply_override(Node& root, const std::string& assignment) {
+bool apply_override(Node& root, const std::string& assignment) {
   const std::string origin = "--set " + assignment;
   const std::size_t equals = assignment.find('=');
   if (equals == std::string::npos || equals == 0) {
@@ -239,8 +240,14 @@ void apply_override(Node& root, const std::string& assignment) {
                                   path.substr(0, start - 1), node->found()));
     }
     if (last) {
+      if (value->kind == Node::Kind::null && node->kind == Node::Kind::map) {
+        const auto is_it = [&](const auto& entry) { return entry.first == key; };
+        node->entries.erase(std::remove_if(node->entries.begin(), node->entries.end(), is_it),
+                            node->entries.end());
+        return false;
+      }
       *slot = value;
-      return;
+      return true;
     }
     if (!*slot) {
       *slot = std::make_shared<Node>();

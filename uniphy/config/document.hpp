@@ -43,8 +43,9 @@ std::shared_ptr<Node> parse_document(const std::string& text, const std::string&
 std::shared_ptr<Node> load_document(const std::filesystem::path& file);
 
 /// Applies one `key.path=value` (value in YAML syntax; numbers in the path index lists, the length
-/// of the list appends) to the root map. Maps on the way are made. Throws Error.
-void apply_override(Node& root, const std::string& assignment);
+/// of the list appends) to the root map. Maps on the way are made. Without a value the key is taken
+/// out of the map again, and the result is false. Throws Error.
+bool apply_override(Node& root, const std::string& assignment);
 
 /// The document as YAML that parse_document reads back to the same tree.
 std::string emit_document(const Node& root);

@@ -17,12 +17,16 @@ bool is_plain(const std::string& text) {
   return text[0] != '-' || parse_real(text).has_value();
 }
 
-/// Whether a plain text would be read as something other than a string.
+/// Whether a plain text could be read as something other than a string, by YAML 1.1 too: 1:30 is
+/// ninety there, 0b1 is one, 2001-01-01 a date, and "no" is false.
 bool looks_typed(const std::string& text) {
-  static const char* const words[] = {"null", "Null", "NULL", "true", "false", "~"};
-  return parse_real(text).has_value() ||
-         std::find(std::begin(words), std::end(words), text) != std::end(words) ||
-         text.find_first_not_of('.') == std::string::npos;
+  static const char* const words[] = {"null", "true", "false", "yes", "no", "on", "off", "y", "n"};
+  std::string lower = text;
+  for (char& c : lower) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  const std::size_t first = text.find_first_not_of("+-.");
+  return first == text.npos || (text[first] >= '0' && text[first] <= '9') ||
+         parse_real(text).has_value() ||
+         std::find(std::begin(words), std::end(words), lower) != std::end(words);
 }
 
 std::string quoted(const std::string& text) {

@@ -202,10 +202,14 @@ std::filesystem::path Section::input_path(const std::string& key, Default<std::s
 std::filesystem::path Section::existing_path(const std::string& key,
                                              const Default<std::string>& fallback,
                                              const std::string& kind, const std::string& doc) {
+  const bool may_be_none = fallback.value && fallback.value->empty();
+  const auto parse = [&](const Node& node) {
+    const bool none = may_be_none && node.kind == Node::Kind::scalar && node.text == "none";
+    return none ? std::optional<std::string>("") : text_in(node);
+  };
   const std::string name =
-      scalar<std::string>(key, fallback, {kind, "", ""}, doc, "", text_in, same_text);
-  if (state_->describing || (name.empty() && fallback.value && fallback.value->empty()))
-    return name;
+      scalar<std::string>(key, fallback, {kind, "", ""}, doc, "", parse, same_text);
+  if (state_->describing || (name.empty() && may_be_none)) return name;
   std::error_code ignored;
   if (!std::filesystem::exists(name, ignored)) {
     fail(key, fmt::format("expected a {}, found \"{}\", which does not exist", kind, name));
@@ -228,6 +232,25 @@ std::optional<double> Section::real_or(const std::string& word, const std::strin
   return scalar<Value>(key, fallback,
                        {real_noun(range), fmt::format("{} or \"{}\"", range.text(), word), unit},
                        doc, Value(), parse, show);
+}
+
+void Section::one_of(const std::string& key, const std::string& other) {
+  const auto given = [&](const std::string& name) {
+    const auto node = given_->find(name);
+    const bool none = node && node->kind == Node::Kind::scalar && node->text == "none";
+    return none ? nullptr : node;
+  };
+  const auto first = given(key), second = given(other);
+  if (first && second) {
+    fail(key, fmt::format("expected this or {}, found both ({}: {})", full_path(other),
+                          second->origin, second->found()));
+  }
+  const std::string& unused = first ? other : key;
+  if (state_->describing || given_->find(unused)) return;
+  auto& read = resolved_->entries;
+  read.erase(std::find_if(read.begin(), read.end(),
+                          [&](const auto& entry) { return entry.first == unused; }));
+  state_->absent.push_back(full_path(unused));
 }
 
 std::vector<double> Section::reals_of(const std::string& key,

@@ -111,6 +111,12 @@ Section Section::section(const std::string& key, const std::string& doc) {
 }
 
 std::optional<Section> Section::optional_section(const std::string& key, const std::string& doc) {
+  const auto said = given_->find(key);
+  const bool none = said && said->kind == Node::Kind::scalar && said->text == "none";
+  if (none) {
+    const auto is_it = [&](const auto& entry) { return entry.first == key; };
+    given_->entries.erase(std::find_if(given_->entries.begin(), given_->entries.end(), is_it));
+  }
   if (!state_->describing && !has(key)) {
     // Remembered, so that a misspelt key finds its neighbour.
     state_->absent.push_back(full_path(key));

@@ -76,7 +76,11 @@ std::optional<bool> parse_boolean(const std::string& text) {
 std::string format_real(double value) {
   if (std::isnan(value)) return ".nan";
   if (std::isinf(value)) return value > 0 ? ".inf" : "-.inf";
-  return fmt::format("{}", value);
+  std::string text = fmt::format("{}", value);
+  // 5e-05 is text to readers of YAML 1.1 (PyYAML among them), 5.0e-05 is a number to all.
+  const std::size_t exponent = text.find('e');
+  if (exponent != text.npos && text.find('.') == text.npos) text.insert(exponent, ".0");
+  return text;
 }
 
 }  // namespace uniphy

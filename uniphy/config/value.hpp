@@ -51,7 +51,7 @@ std::optional<double> parse_real(const std::string& text);
 std::optional<std::int64_t> parse_integer(const std::string& text);
 std::optional<bool> parse_boolean(const std::string& text);
 
-/// The shortest decimal that reads back to the same bits.
+/// The shortest decimal that reads back to the same bits and is a number in YAML 1.1 and 1.2.
 std::string format_real(double value);
 
 }  // namespace uniphy

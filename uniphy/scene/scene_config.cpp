@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "ops/kernels/base/error.hpp"
+#include "uniphy/io/physical_limits.hpp"
 
 namespace uniphy {
 namespace {
@@ -30,7 +31,8 @@ BodyDescription read_body(Section& section, std::size_t number) {
   body.on_floor = section.boolean(
       "on_floor", false,
       "the body stands on the wall that gravity points at; center does not count along gravity");
-  body.density = section.real("density", 1000, positive(), "kg/m^3", "mass density");
+  body.density = section.real("density", 1000, between(kLeastDensity, kLargestDensity), "kg/m^3",
+                              "mass density");
   body.velocity = vector3(section, "velocity", {0, 0, 0}, "m/s", "at the start");
   body.angular_velocity =
       vector3(section, "angular_velocity", {0, 0, 0}, "rad/s", "at the start, about center");
@@ -43,18 +45,19 @@ SceneDescription read_scene_settings(Section& scene) {
   SceneDescription settings;
   settings.grid.n =
       static_cast<int>(scene.integer("grid", 20, between(8, 1024), "", "nodes a side"));
-  settings.dt = scene.real_or("auto", "dt", std::optional<double>(), positive(), "s",
-                              "time step; auto: from sound speed, viscosity and speed");
+  settings.dt = scene.real_or("auto", "dt", std::optional<double>(), between(kLeastTimeStep, 1),
+                              "s", "time step; auto: from sound speed, viscosity and speed");
   settings.safety = scene.real("safety", kTimeStepSafety, Range{0, 1, true, false}, "",
                                "share of the stable time step that auto takes");
   settings.steps = scene.integer("steps", 1000, between(0, 1e9), "", "number of time steps");
   settings.duration = scene.real_or("none", "duration", std::optional<double>(), at_least(0), "s",
-                                    "simulated time; where it is given, steps does not count");
+                                    "simulated time, in place of steps");
+  scene.one_of("duration", "steps");
   settings.frame_stride =
       scene.integer("frame_stride", 5, between(1, 1e9), "", "steps from frame to frame");
-  const std::array<double, 3> gravity =
-      scene.vector3("gravity", std::array<double, 3>{0, -9.8, 0}, any_number(), "m/s^2",
-                    "acceleration of everything");
+  const std::array<double, 3> gravity = scene.vector3("gravity", std::array<double, 3>{0, -9.8, 0},
+                                                      between(-kLargestGravity, kLargestGravity),
+                                                      "m/s^2", "acceleration of everything");
   std::copy(gravity.begin(), gravity.end(), settings.grid.gravity);
   const std::string walls =
       scene.choice("walls", std::string("freeslip"), {"freeslip", "noslip"},
@@ -85,6 +88,9 @@ SceneSource read_scene(Section& config, bool with_laws) {
       section.fail("name", fmt::format("expected a name of its own, found \"{}\" again",
                                        body.description.name));
     }
+    for (const char* key : {"center", "rotation", "size"}) {
+      if (section.has(key)) body.placed_by.push_back(key);
+    }
     Section shape = section.section("shape", "what the body looks like");
     body.shape = read_shape(shape);
     Section filling = section.section("filling", "the particles that it is made of");
@@ -112,6 +118,12 @@ SceneDescription SceneSource::load() const {
     BodyDescription body = source.description;
     try {
       source.shape(&body);
+      if (body.in_place && body.on_floor) {
+        throw Error("expected in_place: true or on_floor: true, found both");
+      }
+      if (body.in_place && !source.placed_by.empty()) {
+        throw Error(fmt::format("expected in_place: true or {}, found both", source.placed_by[0]));
+      }
       if (with_laws_) body.law = source.law.load();
     } catch (const Error& error) {
       throw Error(fmt::format("body \"{}\": {}", body.name, error.what()));

@@ -178,5 +178,55 @@ TEST(Config, SectionFailNamesThePlace) {
             "f.yaml:4: scene.grid: too coarse for the shape");
 }
 
+TEST(Config, TextThatLooksLikeANumberStaysText) {
+  for (const char* text :
+       {"1:30", "0x10", "1_000", "2001-01-01", "no", "On", "y", "5e-05", ".5", "~"}) {
+    const Config config = Config::parse(std::string("name: \"") + text + "\"\n");
+    EXPECT_EQ(config.root().text("name", "", "doc"), text);
+    EXPECT_EQ(config.resolved(), std::string("name: \"") + text + "\"\n");
+  }
+}
+
+TEST(Config, AnEmptyOverrideTakesAKeyBack) {
+  const Config config = Config::parse("grid: 9\nheldout: missing.h5\nresume: {}\n", "f.yaml",
+                                      {"grid=", "heldout=", "resume=none"});
+  Section root = config.root();
+  EXPECT_EQ(root.integer("grid", 20, any_number(), "", "doc"), 20);
+  EXPECT_EQ(root.input_file("heldout", "", "doc"), "");
+  EXPECT_FALSE(root.optional_section("resume", "doc").has_value());
+  config.finish();
+}
+
+TEST(Config, AnEmptyOverrideOfAnUnknownKeyIsRefused) {
+  const Config config = Config::parse("grid: 9\n", "f.yaml", {"gird="});
+  config.root().integer("grid", 20, any_number(), "", "doc");
+  EXPECT_EQ(testing::error_of([&] { config.finish(); }), "--set gird=: gird: unknown key");
+}
+
+TEST(Config, NoneIsNoFile) {
+  const Config config = Config::parse("heldout: missing.h5\n", "f.yaml", {"heldout=none"});
+  EXPECT_EQ(config.root().input_file("heldout", "", "doc"), "");
+  const Config needed = Config::parse("file: none\n", "f.yaml");
+  EXPECT_EQ(testing::error_of([&] { needed.root().input_file("file", required, "doc"); }),
+            "f.yaml:1: file: expected a file, found \"none\", which does not exist");
+}
+
+TEST(Config, KeysThatExcludeEachOther) {
+  const auto read = [](const Config& config) {
+    Section root = config.root();
+    const auto length =
+        root.real_or("none", "length", std::optional<double>(), positive(), "m", "doc");
+    const auto count = root.integer("count", 5, any_number(), "", "doc");
+    root.one_of("length", "count");
+    config.finish();
+    return length.value_or(static_cast<double>(count));
+  };
+  EXPECT_EQ(read(Config::parse("count: 7\n")), 7);
+  EXPECT_EQ(read(Config::parse("length: 2\n")), 2);
+  EXPECT_EQ(read(Config::parse("length: none\ncount: 7\n")), 7);
+  EXPECT_EQ(testing::error_of([&] { read(Config::parse("count: 7\n", "f.yaml", {"length=2"})); }),
+            "--set length=2: length: expected this or count, found both (f.yaml:1: \"7\")");
+}
+
 }  // namespace
 }  // namespace uniphy

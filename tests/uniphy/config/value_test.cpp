@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 #include <random>
+#include <regex>
 
 namespace uniphy {
 namespace {
@@ -51,6 +52,16 @@ TEST(FormatReal, ReadsBackToTheSameBits) {
     ASSERT_EQ(*back, value);
   }
   EXPECT_EQ(format_real(std::numeric_limits<double>::infinity()), ".inf");
+}
+
+TEST(FormatReal, IsANumberInEveryVersionOfYaml) {
+  // "Float" and "int" of yaml.org/type, which YAML 1.1 takes: a point, and a sign in the exponent.
+  const std::regex number("[-+]?([0-9]+[.][0-9]*([eE][-+][0-9]+)?|[0-9]+)");
+  for (const double value : {5e-5, 1e-300, 1e16, -2e22, 1.25e-7, 0.1, 1000.0, -3.0, 1e15, 1e100}) {
+    EXPECT_TRUE(std::regex_match(format_real(value), number)) << format_real(value);
+  }
+  EXPECT_EQ(format_real(5e-5), "5.0e-05");
+  EXPECT_EQ(format_real(1e16), "1.0e+16");
 }
 
 TEST(Range, ContainsItsClosedEndsOnly) {

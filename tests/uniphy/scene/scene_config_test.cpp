@@ -66,13 +66,54 @@ TEST(ReadScene, ReadsEveryKey) {
 }
 
 TEST(ReadScene, ResolvedConfigurationGivesTheSameScene) {
-  const Config config = Config::parse(kCube, "scene.yaml", {"scene.duration=0.01"});
+  const Config config = Config::parse(kCube, "scene.yaml", {"scene.steps=", "scene.duration=0.01"});
   Section root = config.root();
   const PlacedScene first = place_scene(read_scene(root).load());
   const PlacedScene again = place_scene(load(config.resolved()));
   EXPECT_EQ(first.x, again.x);
   EXPECT_EQ(first.v, again.v);
   EXPECT_EQ(first.steps, again.steps);
+}
+
+/// What reading the scene with these overrides throws.
+std::string error_of(const std::vector<std::string>& overrides) {
+  const Config config = Config::parse(kCube, "scene.yaml", overrides);
+  Section root = config.root();
+  try {
+    read_scene(root).load();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(ReadScene, DurationAndStepsExcludeEachOther) {
+  EXPECT_EQ(error_of({"scene.duration=0.5"}),
+            "--set scene.duration=0.5: scene.duration: expected this or scene.steps, found both "
+            "(scene.yaml:2: \"7\")");
+  // One of them in the configuration that a run leaves, which can be run again.
+  for (const auto& [overrides, steps] : std::vector<std::pair<std::vector<std::string>, bool>>{
+           {{}, true},
+           {{"scene.duration=none"}, true},
+           {{"scene.steps=", "scene.duration=1"}, false}}) {
+    const Config config = Config::parse(kCube, "scene.yaml", overrides);
+    Section root = config.root();
+    read_scene(root);
+    config.finish();
+    EXPECT_EQ(config.resolved().find("steps:") != std::string::npos, steps);
+    const Config again = Config::parse(config.resolved());
+    Section root_again = again.root();
+    read_scene(root_again);
+    again.finish();
+    EXPECT_EQ(again.resolved(), config.resolved());
+  }
+}
+
+TEST(ReadScene, RefusesNumbersBeyondPhysics) {
+  for (const char* override :
+       {"bodies.0.density=1e300", "scene.dt=1e-300", "scene.gravity.1=1e300"}) {
+    EXPECT_THAT(error_of({override}), HasSubstr(override));
+  }
 }
 
 TEST(ReadScene, EveryShapeOfTheCatalogueHasItsDefaultsInTheConfiguration) {
@@ -107,8 +148,8 @@ class ExampleScene : public testing::TestWithParam<const char*> {
 };
 
 TEST_P(ExampleScene, CanStart) {
-  const Config config =
-      Config::load(std::string("configs/simulate/") + GetParam() + ".yaml", {"scene.duration=0"});
+  const Config config = Config::load(std::string("configs/simulate/") + GetParam() + ".yaml",
+                                     {"scene.steps=", "scene.duration=0"});
   Section root = config.root();
   const SceneSource source = read_scene(root);
   read_simulation_output(root);
