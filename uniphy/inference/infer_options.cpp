@@ -40,13 +40,13 @@ FitOptions read_fit_options(Section& config) {
   const std::string method = schedule.choice("optimizer", std::string("bfgs"), {"bfgs", "adam"},
                                              "how candidates are improved");
   const double rate =
-      schedule.real("rate", 0.1, positive(), "",
+      schedule.real("rate", 0.1, Range{0, 1e3, true}, "",
                     "length of the first step (adam: of every step, falling along a cosine), in "
                     "units of the spread of the training codes");
   options.patience = static_cast<int>(
       schedule.integer("patience", 8, at_least(1), "",
                        "a candidate stops after so many epochs that gain less than 1 %"));
-  options.clip = schedule.real("clip", 10, positive(), "",
+  options.clip = schedule.real("clip", 10, Range{0, 1e6, true}, "",
                                "adam: longest gradient, in multiples of their mean length");
   if (!config.describing()) {
     if (candidates.size() != horizon.size() || epochs.size() != horizon.size()) {

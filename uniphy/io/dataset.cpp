@@ -14,13 +14,14 @@ struct Field {
   const char* units;
   const char* description;
   std::vector<double> LawSamples::*data;
+  double limit;  ///< far beyond every material: what is larger is damage
 };
 
 constexpr Field kFields[] = {
-    {"F", "1", "trial deformation gradient", &LawSamples::F},
-    {"F_proj", "1", "projected deformation gradient", &LawSamples::F_proj},
-    {"C", "1/s", "affine velocity", &LawSamples::C},
-    {"tau", "Pa", "Kirchhoff stress of (F_proj, C)", &LawSamples::tau},
+    {"F", "1", "trial deformation gradient", &LawSamples::F, 1e6},
+    {"F_proj", "1", "projected deformation gradient", &LawSamples::F_proj, 1e6},
+    {"C", "1/s", "affine velocity", &LawSamples::C, 1e12},
+    {"tau", "Pa", "Kirchhoff stress of (F_proj, C)", &LawSamples::tau, 1e18},
 };
 
 }  // namespace
@@ -133,6 +134,8 @@ Dataset read_dataset(const std::filesystem::path& file) {
   for (const Field& field : kFields) {
     dataset.samples.*field.data = reader.read<double>(fmt::format("samples/{}", field.name),
                                                       {samples, 3, 3}, hdf5::Values::finite);
+    hdf5::check_magnitude(reader, fmt::format("/samples/{}", field.name),
+                          dataset.samples.*field.data, field.limit);
   }
   if (reader.has("samples/source")) {
     dataset.samples.source = reader.read<std::int32_t>("samples/source", {samples});
@@ -153,6 +156,12 @@ Dataset read_dataset(const std::filesystem::path& file) {
     ++dataset.first[static_cast<std::size_t>(row) + 1];
   }
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
+    if (dataset.first[i + 1] == 0) {
+      reader.fail(
+          "/samples/trajectory",
+          fmt::format("expected samples of all {} trajectories, found none of trajectory {}", count,
+                      i));
+    }
     dataset.first[i + 1] += dataset.first[i];
   }
   return dataset;

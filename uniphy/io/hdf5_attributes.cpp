@@ -7,6 +7,7 @@
 
 #include "uniphy/io/hdf5_handle.hpp"
 #include "uniphy/io/hdf5_reader_impl.hpp"
+#include "uniphy/io/text_lines.hpp"
 
 namespace uniphy::hdf5 {
 namespace {
@@ -41,7 +42,10 @@ OpenAttribute open_attribute(hid_t file, const std::string& object, const std::s
   if (!attribute.type.valid() || !space.valid()) {
     fail(fmt::format("cannot be read: {}", hdf5_reason()));
   }
-  if (H5Tget_class(attribute.type) != wanted) {
+  // h5py stores density = 1000 as an integer, and grid = 20.0 as a real number.
+  const H5T_class_t found = H5Tget_class(attribute.type);
+  const bool numbers = wanted != H5T_STRING && (found == H5T_INTEGER || found == H5T_FLOAT);
+  if (found != wanted && !numbers) {
     fail(fmt::format("expected {}, found {}", wanted_text, type_text(attribute.type)));
   }
   attribute.count = H5Sget_simple_extent_npoints(space);
@@ -67,6 +71,10 @@ bool Reader::has_attribute(const std::string& object, const std::string& name) c
 std::string Reader::attribute_text(const std::string& object, const std::string& name) const {
   const std::string title = attribute_title(rooted(object), name);
   const auto fail = [&](const std::string& message) { impl_->fail(title, message); };
+  const auto checked = [&](const std::string& text) {
+    if (!is_utf8(text)) fail("expected UTF-8 text, found " + quoted_word(text));
+    return text;
+  };
   if (!has_attribute(object, name)) fail("expected text, found no such attribute");
   const auto attribute =
       open_attribute(impl_->file, rooted(object), name, H5T_STRING, "text", 1, fail);
@@ -80,7 +88,7 @@ std::string Reader::attribute_text(const std::string& object, const std::string&
     std::string text = pointer ? pointer : "";
     const Handle space = dataspace(H5Aget_space(attribute.handle));
     H5Dvlen_reclaim(memory_type, space, H5P_DEFAULT, &pointer);
-    return text;
+    return checked(text);
   }
   const std::size_t width = H5Tget_size(attribute.type);
   if (width > static_cast<std::size_t>(impl_->file_bytes)) {
@@ -90,7 +98,7 @@ std::string Reader::attribute_text(const std::string& object, const std::string&
   if (H5Aread(attribute.handle, attribute.type, buffer.data()) < 0) {
     fail(fmt::format("cannot be read: {}", hdf5_reason()));
   }
-  return std::string(buffer.data(), strnlen(buffer.data(), width));
+  return checked(std::string(buffer.data(), strnlen(buffer.data(), width)));
 }
 
 std::vector<double> Reader::attribute_reals(const std::string& object, const std::string& name,
@@ -98,8 +106,8 @@ std::vector<double> Reader::attribute_reals(const std::string& object, const std
   const std::string title = attribute_title(rooted(object), name);
   const auto fail = [&](const std::string& message) { impl_->fail(title, message); };
   if (!has_attribute(object, name)) fail("expected numbers, found no such attribute");
-  const auto attribute = open_attribute(impl_->file, rooted(object), name, H5T_FLOAT,
-                                        "floating-point numbers", count, fail);
+  const auto attribute =
+      open_attribute(impl_->file, rooted(object), name, H5T_FLOAT, "numbers", count, fail);
   std::vector<double> values(static_cast<std::size_t>(attribute.count));
   if (!values.empty() && H5Aread(attribute.handle, H5T_NATIVE_DOUBLE, values.data()) < 0) {
     fail(fmt::format("cannot be read: {}", hdf5_reason()));
@@ -122,6 +130,17 @@ std::int64_t Reader::attribute_integer(const std::string& object, const std::str
   if (!has_attribute(object, name)) fail("expected an integer, found no such attribute");
   const auto attribute =
       open_attribute(impl_->file, rooted(object), name, H5T_INTEGER, "an integer", 1, fail);
+  if (H5Tget_class(attribute.type) == H5T_FLOAT) {
+    double value = 0;
+    if (H5Aread(attribute.handle, H5T_NATIVE_DOUBLE, &value) < 0) {
+      fail(fmt::format("cannot be read: {}", hdf5_reason()));
+    }
+    // Doubles hold every integer up to 2⁵³.
+    if (!(std::abs(value) <= 0x1p53) || value != std::floor(value)) {
+      fail(fmt::format("expected an integer, found {}", value));
+    }
+    return static_cast<std::int64_t>(value);
+  }
   std::int64_t value = 0;
   if (H5Aread(attribute.handle, H5T_NATIVE_INT64, &value) < 0) {
     fail(fmt::format("cannot be read: {}", hdf5_reason()));

@@ -9,6 +9,8 @@ namespace uniphy {
 namespace {
 
 constexpr const char* kFormat = "uniphy-model";
+/// Codes are drawn and held near 0.1 to 1; what is larger than this is damage.
+constexpr double kLargestCode = 1e6;
 constexpr int kMaximumLayers = 64;
 constexpr std::int64_t kMaximumLatent = 4096;
 
@@ -145,6 +147,7 @@ ModelFile read_model(const std::filesystem::path& file) {
   model.materials = reader.read_strings("latents/material");
   const std::int64_t count = model.codes();
   model.latents = reader.read<double>("latents/z", {count, size}, hdf5::Values::finite);
+  hdf5::check_magnitude(reader, "/latents/z", model.latents, kLargestCode);
   const auto parameters =
       reader.read<double>("latents/parameters", {count, kernels::kLawParameters});
   model.parameters.resize(static_cast<std::size_t>(count));

@@ -8,6 +8,7 @@
 
 #include "ops/kernels/base/error.hpp"
 #include "uniphy/io/hdf5.hpp"
+#include "uniphy/io/physical_limits.hpp"
 
 namespace uniphy {
 namespace {
@@ -43,22 +44,33 @@ void check(const Observation& observation, const Fail& fail) {
                            "frame {}",
                            observation.x[k], particle % count, particle / count));
   }
+  const auto row = static_cast<std::size_t>(3 * observation.particles);
+  const bool one_place =
+      row > 3 && observation.x.size() >= row &&
+      std::equal(observation.x.begin() + 3, observation.x.begin() + row, observation.x.begin());
+  if (one_place) {
+    fail("/x",
+         fmt::format("expected a body, found all {} particles at one place in the first frame",
+                     observation.particles));
+  }
   const auto scene = [&](bool good, const char* name, const std::string& message) {
     if (!good) fail(fmt::format("attribute {} of /scene", name), message);
   };
   scene(observation.grid >= 8 && observation.grid <= 1024, "grid",
         fmt::format("expected 8 to 1024 nodes, found {}", observation.grid));
-  scene(observation.dt > 0 && observation.dt < 1, "dt",
-        fmt::format("expected a time step in (0, 1) s, found {}", observation.dt));
+  scene(observation.dt >= kLeastTimeStep && observation.dt < 1, "dt",
+        fmt::format("expected a time step in [{}, 1) s, found {}", kLeastTimeStep, observation.dt));
   scene(observation.walls == "freeslip" || observation.walls == "noslip", "walls",
         fmt::format("expected \"freeslip\" or \"noslip\", found \"{}\"", observation.walls));
-  scene(observation.bound >= 1 && 2 * observation.bound < observation.grid, "bound",
+  scene(observation.bound >= 1 && observation.bound <= (observation.grid - 1) / 2, "bound",
         fmt::format("expected 1 to {} nodes, found {}", (observation.grid - 1) / 2,
                     observation.bound));
-  scene(observation.density > 0, "density",
-        fmt::format("expected a density > 0 kg/m^3, found {}", observation.density));
+  scene(observation.density >= kLeastDensity && observation.density <= kLargestDensity, "density",
+        fmt::format("expected {} to {} kg/m^3, found {}", kLeastDensity, kLargestDensity,
+                    observation.density));
   for (const double g : observation.gravity) {
-    scene(std::isfinite(g), "gravity", fmt::format("expected finite numbers, found {}", g));
+    scene(std::abs(g) <= kLargestGravity, "gravity",
+          fmt::format("expected at most {} m/s^2 either way, found {}", kLargestGravity, g));
   }
 }
 

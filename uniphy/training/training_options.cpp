@@ -52,7 +52,7 @@ TrainingOptions read_training_options(Section& config, const TrainingOptions& de
                                "the trajectory's RMS");
   options.delta = t.real("delta", options.delta, Range{1e-12, 1e12}, "",
                          "squared relative error below which the logarithm is linear");
-  options.clip = t.real("clip", options.clip, positive(), "", "largest gradient norm");
+  options.clip = t.real("clip", options.clip, Range{0, 1e6, true}, "", "largest gradient norm");
   options.checkpoint_every =
       t.integer("checkpoint_every", options.checkpoint_every, at_least(1), "steps", "");
   return options;

@@ -38,16 +38,16 @@ TEST(Dataset, ReadsBackWhatWasAppendedTrajectoryByTrajectory) {
     const testing::Scratch scratch;
     DatasetWriter writer(scratch.file("d.h5"), "seed: 1\n", gzip);
     writer.append(record_of("elastic"), samples_of(5, 0));
-    writer.append(record_of("newtonian"), {});  // a trajectory may give nothing of interest
+    writer.append(record_of("newtonian"), samples_of(1, 3));
     writer.append(record_of("sand"), samples_of(2000, 1000));
-    EXPECT_EQ(writer.samples(), 2005);
+    EXPECT_EQ(writer.samples(), 2006);
     writer.finish();
 
     const Dataset dataset = read_dataset(scratch.file("d.h5"));
     EXPECT_EQ(dataset.config, "seed: 1\n");
     ASSERT_EQ(dataset.trajectories.size(), 3u);
-    EXPECT_THAT(dataset.first, ElementsAre(0, 5, 5, 2005));
-    EXPECT_EQ(dataset.samples.size(), 2005);
+    EXPECT_THAT(dataset.first, ElementsAre(0, 5, 6, 2006));
+    EXPECT_EQ(dataset.samples.size(), 2006);
     EXPECT_EQ(dataset.trajectories[2].material, "sand");
     EXPECT_EQ(dataset.trajectories[2].parameters[1], 2e4);
     EXPECT_TRUE(std::isnan(dataset.trajectories[2].parameters[4]));
@@ -55,13 +55,14 @@ TEST(Dataset, ReadsBackWhatWasAppendedTrajectoryByTrajectory) {
     EXPECT_EQ(dataset.trajectories[0].seed, 77);
     EXPECT_EQ(dataset.trajectories[1].shape, "torus");
     EXPECT_EQ(dataset.trajectory[4], 0);
-    EXPECT_EQ(dataset.trajectory[5], 2);
+    EXPECT_EQ(dataset.trajectory[5], 1);
+    EXPECT_EQ(dataset.trajectory[6], 2);
     const LawSamples last = samples_of(2000, 1000);
-    EXPECT_TRUE(std::equal(last.tau.begin(), last.tau.end(), dataset.samples.tau.begin() + 45));
-    EXPECT_TRUE(std::equal(last.C.begin(), last.C.end(), dataset.samples.C.begin() + 45));
+    EXPECT_TRUE(std::equal(last.tau.begin(), last.tau.end(), dataset.samples.tau.begin() + 54));
+    EXPECT_TRUE(std::equal(last.C.begin(), last.C.end(), dataset.samples.C.begin() + 54));
     EXPECT_TRUE(
-        std::equal(last.F_proj.begin(), last.F_proj.end(), dataset.samples.F_proj.begin() + 45));
-    EXPECT_TRUE(std::equal(last.F.begin(), last.F.end(), dataset.samples.F.begin() + 45));
+        std::equal(last.F_proj.begin(), last.F_proj.end(), dataset.samples.F_proj.begin() + 54));
+    EXPECT_TRUE(std::equal(last.F.begin(), last.F.end(), dataset.samples.F.begin() + 54));
   }
 }
 
@@ -111,6 +112,12 @@ TEST(Dataset, MalformedFilesAreRefused) {
             "d.h5: /samples/trajectory: expected rows from 0 to 1 in order, found -1 after 0");
   EXPECT_EQ(message({0}, std::nan(""), 1e-3),
             "d.h5: /samples/F: expected finite numbers, found nan at position 0");
+  EXPECT_EQ(
+      message({0, 0, 1}, 1e300, 1e-3),
+      "d.h5: /samples/F: expected numbers of at most 1e+06 either way, found 1e+300 at position 0");
+  EXPECT_EQ(message({0, 0, 0}, 1, 1e-3),
+            "d.h5: /samples/trajectory: expected samples of all 2 trajectories, found none of "
+            "trajectory 1");
   EXPECT_EQ(message({0}, 1, 0), "d.h5: /trajectories/dt: expected time steps > 0 s, found 0");
 }
 

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <hdf5.h>
 #include <unistd.h>
 
 #include <cmath>
@@ -176,6 +177,57 @@ TEST(Hdf5, WriterRefusesWhatDoesNotFit) {
   std::filesystem::create_directory(scratch.file("folder.h5"));
   EXPECT_EQ(message([&] { Writer(scratch.file("folder.h5")); }),
             "folder.h5: expected a file, found a directory");
+}
+
+// What h5py stores where its user writes density = 1000, gravity = [0, -10, 0] and grid = 20.0.
+TEST(Hdf5, ReadsIntegersAsRealsAndWholeRealsAsIntegers) {
+  const testing::Scratch scratch;
+  const hid_t file =
+      H5Fcreate(scratch.file("f.h5").c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+  const auto attribute = [&](const char* name, hid_t type, const hid_t space, const void* data) {
+    const hid_t id = H5Acreate2(file, name, type, space, H5P_DEFAULT, H5P_DEFAULT);
+    H5Awrite(id, type, data);
+    H5Aclose(id);
+    H5Sclose(space);
+  };
+  const std::int64_t density = 1000, gravity[3] = {0, -10, 0};
+  const double grid = 20, half = 20.5, huge = 1e300;
+  const hsize_t three = 3;
+  attribute("density", H5T_STD_I64LE, H5Screate(H5S_SCALAR), &density);
+  attribute("gravity", H5T_STD_I64LE, H5Screate_simple(1, &three, nullptr), gravity);
+  attribute("grid", H5T_IEEE_F64LE, H5Screate(H5S_SCALAR), &grid);
+  attribute("half", H5T_IEEE_F64LE, H5Screate(H5S_SCALAR), &half);
+  attribute("huge", H5T_IEEE_F64LE, H5Screate(H5S_SCALAR), &huge);
+  const hid_t space = H5Screate_simple(1, &three, nullptr);
+  const hid_t set =
+      H5Dcreate2(file, "x", H5T_STD_I64LE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+  H5Dwrite(set, H5T_NATIVE_INT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, gravity);
+  H5Dclose(set);
+  H5Sclose(space);
+  H5Fclose(file);
+
+  const hdf5::Reader reader(scratch.file("f.h5"));
+  EXPECT_EQ(reader.attribute_real("/", "density"), 1000);
+  EXPECT_EQ(reader.attribute_reals("/", "gravity", 3), (std::vector<double>{0, -10, 0}));
+  EXPECT_EQ(reader.attribute_integer("/", "grid"), 20);
+  EXPECT_EQ(reader.read<double>("x", {3}), (std::vector<double>{0, -10, 0}));
+  for (const char* name : {"half", "huge"}) {
+    EXPECT_THAT(testing::error_of([&] { reader.attribute_integer("/", name); }),
+                ::testing::HasSubstr("expected an integer, found"));
+  }
+}
+
+TEST(Hdf5, RefusesTextThatIsNotUtf8) {
+  const testing::Scratch scratch;
+  hdf5::Writer writer(scratch.file("f.h5"));
+  writer.write_strings("names", {"sand", "s\xff"}, {"1", "names"});
+  writer.attribute("/", "law", "\xc3(");
+  writer.commit();
+  const hdf5::Reader reader(scratch.file("f.h5"));
+  EXPECT_THAT(testing::error_of([&] { reader.read_strings("names"); }),
+              ::testing::HasSubstr("/names: expected UTF-8 text, found \"s\\xff\""));
+  EXPECT_THAT(testing::error_of([&] { reader.attribute_text("/", "law"); }),
+              ::testing::HasSubstr("attribute law: expected UTF-8 text, found \"\\xc3(\""));
 }
 
 }  // namespace

@@ -9,14 +9,15 @@
 #include <cmath>
 
 #include "ops/kernels/base/error.hpp"
+#include "tests/uniphy/support/limits.hpp"
 #include "uniphy/geometry/shape_catalogue.hpp"
 
 namespace uniphy {
 namespace {
 
 using Eigen::Vector3d;
-using testing::AllOf;
-using testing::HasSubstr;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
 
 BodyDescription ball(const Vector3d& centre, double size = 0.2) {
   BodyDescription body;
@@ -268,6 +269,15 @@ TEST(RunScene, NamesTheParticleThatLeavesTheGrid) {
   } catch (const Error& error) {
     EXPECT_THAT(error.what(), AllOf(HasSubstr("particle"), HasSubstr("step")));
   }
+}
+
+TEST(PlaceScene, RefusesAGridThatDoesNotFitIntoMemory) {
+  SceneDescription scene = one(ball({0.5, 0.5, 0.5}));
+  scene.grid.n = 1024;
+  EXPECT_THAT(testing::error_with_limit(RLIMIT_AS, rlim_t{4} << 30, [&] { place_scene(scene); }),
+              HasSubstr("scene.grid: 1024 nodes a side take 34.4 GB, expected at most 4.29 GB"));
+  scene.grid.n = 64;
+  EXPECT_EQ(testing::error_with_limit(RLIMIT_AS, rlim_t{4} << 30, [&] { place_scene(scene); }), "");
 }
 
 }  // namespace
