@@ -22,8 +22,8 @@ FitOptions read_fit_options(Section& config) {
       velocity.boolean("refine", false, "fit it together with the material in the last stage");
 
   Section prior = config.section("prior", "adds weight |z|^2/sigma^2 to mse/size^2");
-  options.prior = prior.real("weight", 0, at_least(0), "", "0: no prior");
-  options.prior_sigma = prior.real("sigma", 1, positive(), "", "width of the prior");
+  options.prior = prior.real("weight", 0, between(0, 1e6), "", "0: no prior");
+  options.prior_sigma = prior.real("sigma", 1, between(1e-6, 1e6), "", "width of the prior");
 
   Section schedule = config.section(
       "schedule", "stages; each list has one entry a stage, the last one sees all frames");

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
+#include <csignal>
 #include <cstdio>
 #include <tuple>
 
@@ -205,6 +206,8 @@ RunDirectory::RunDirectory(std::filesystem::path root, std::string config_yaml, 
 int run_experiment(int argc, const char* const* argv, const ExperimentInfo& info,
                    const DeclareFunction& declare) {
   const auto start = std::chrono::steady_clock::now();
+  // A file beyond the limit on file sizes (ulimit -f) is an error of its writer, not the end.
+  std::signal(SIGXFSZ, SIG_IGN);
   try {
     const CommandLine line = parse_command_line(argc, argv, info);
     if (line.help) {

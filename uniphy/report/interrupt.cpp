@@ -48,8 +48,6 @@ void catch_interrupts() {
   action.sa_flags = SA_RESTART | static_cast<int>(SA_RESETHAND);
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
-  // A file beyond the limit on file sizes (ulimit -f) is an error of its writer, not the end.
-  std::signal(SIGXFSZ, SIG_IGN);
   kernels::between_steps = throw_if_overdue;
 }
 

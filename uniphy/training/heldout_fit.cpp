@@ -17,7 +17,7 @@ LatentFitOptions read_latent_fit_options(Section& config) {
   LatentFitOptions o;
   o.starts = fit.integer("starts", o.starts, between(1, 64), "", "training codes to try");
   o.steps = fit.integer("steps", o.steps, at_least(1), "", "optimizer steps");
-  o.learning_rate = fit.real("learning_rate", o.learning_rate, positive(), "", "of z");
+  o.learning_rate = fit.real("learning_rate", o.learning_rate, Range{0, 1e3, true}, "", "of z");
   return o;
 }
 

@@ -47,7 +47,7 @@ TrainingOptions read_training_options(Section& config, const TrainingOptions& de
       t.real("weight_decay", options.weight_decay, between(0, 100), "", "of AdamW");
   options.latent_sigma =
       t.real("latent_sigma", options.latent_sigma, Range{1e-6, 1e6}, "", "width of the prior of z");
-  options.error_floor = t.real("error_floor", options.error_floor, positive(), "",
+  options.error_floor = t.real("error_floor", options.error_floor, Range{0, 1e6, true}, "",
                                "errors are relative to a sample's own size plus this share of "
                                "the trajectory's RMS");
   options.delta = t.real("delta", options.delta, Range{1e-12, 1e12}, "",

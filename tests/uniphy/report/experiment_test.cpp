@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -264,6 +265,31 @@ TEST(Experiment, SecondSignalEndsARunThatDoesNotListen) {
   const int status = status_after(scratch, {SIGINT, SIGINT}, false);
   ASSERT_TRUE(WIFSIGNALED(status));
   EXPECT_EQ(WTERMSIG(status), SIGINT);
+}
+
+TEST(Experiment, AFileBeyondTheLimitIsAnError) {
+  const testing::Scratch scratch;
+  const std::string config = scratch.write("c.yaml", "b: 2\n"), out = scratch.file("out");
+  for (const rlim_t room : {0, 1000}) {  // for config.yaml, and for what the run writes
+    const pid_t child = ::fork();
+    if (child == 0) {
+      std::signal(SIGXFSZ, SIG_DFL);
+      const rlimit limit{room, room};
+      ::setrlimit(RLIMIT_FSIZE, &limit);
+      const char* argv[] = {"uniphy_example", config.c_str(), "--out", out.c_str()};
+      ::_exit(run_experiment(4, argv, kInfo, [&](Section& section) -> RunFunction {
+        section.real("b", required, any_number(), "m", "unused");
+        return [](RunDirectory& directory, Metrics&) {
+          write_text_file(directory.file("large.txt"), std::string(10000, 'x'));
+        };
+      }));
+    }
+    int status = 0;
+    ::waitpid(child, &status, 0);
+    ASSERT_TRUE(WIFEXITED(status)) << room;
+    EXPECT_EQ(WEXITSTATUS(status), 1) << room;
+    EXPECT_FALSE(std::filesystem::exists(scratch.file("out/large.txt"))) << room;
+  }
 }
 
 }  // namespace
