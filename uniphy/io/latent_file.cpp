@@ -5,6 +5,7 @@
 #include "ops/kernels/base/error.hpp"
 #include "uniphy/io/hdf5.hpp"
 #include "uniphy/io/material_parameters.hpp"
+#include "uniphy/io/physical_limits.hpp"
 
 namespace uniphy {
 namespace {
@@ -94,6 +95,7 @@ LatentFile read_latent(const std::filesystem::path& file) {
   if (latent.law == "learned") {
     latent.model = reader.attribute_text("/", "model");
     latent.z = reader.read<double>("z", {-1}, hdf5::Values::finite);
+    hdf5::check_magnitude(reader, "/z", latent.z, kLargestCode);
     const auto code = reader.read<std::int32_t>("nearest/code", {-1});
     const auto count = static_cast<std::int64_t>(code.size());
     const auto distance = reader.read<double>("nearest/distance", {count});

@@ -4,13 +4,12 @@
 
 #include "ops/kernels/base/error.hpp"
 #include "uniphy/io/hdf5.hpp"
+#include "uniphy/io/physical_limits.hpp"
 
 namespace uniphy {
 namespace {
 
 constexpr const char* kFormat = "uniphy-model";
-/// Codes are drawn and held near 0.1 to 1; what is larger than this is damage.
-constexpr double kLargestCode = 1e6;
 constexpr int kMaximumLayers = 64;
 constexpr std::int64_t kMaximumLatent = 4096;
 
@@ -41,6 +40,8 @@ kernels::MlpWeights read_network(const hdf5::Reader& reader, const std::string& 
     layer.weight = reader.read<double>(group + "/weight", {-1, -1}, hdf5::Values::finite);
     const hdf5::Shape shape = reader.shape(group + "/weight");
     layer.bias = reader.read<double>(group + "/bias", {shape[0]}, hdf5::Values::finite);
+    hdf5::check_magnitude(reader, group + "/weight", layer.weight, kLargestWeight);
+    hdf5::check_magnitude(reader, group + "/bias", layer.bias, kLargestWeight);
     layer.out = static_cast<int>(shape[0]);
     layer.in = static_cast<int>(shape[1]);
     network.layers.push_back(std::move(layer));

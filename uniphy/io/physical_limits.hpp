@@ -12,4 +12,7 @@ inline constexpr double kLeastTimeStep = 1e-9;
 /// m/s², each coordinate. An ultracentrifuge has 1e7.
 inline constexpr double kLargestGravity = 1e7;
 
+/// Latent codes and weights, without units: the model of models/pretrained has 24 and 27 at most.
+inline constexpr double kLargestCode = 1e6, kLargestWeight = 1e6;
+
 }  // namespace uniphy

@@ -57,7 +57,8 @@ std::string help_text(const ExperimentInfo& info, const DeclareFunction& declare
   writes.push_back("DIR/metrics.json    name -> number, with wall_s and peak_memory_mb");
   add_lines(text, "Writes", writes);
   add_lines(text, "Options",
-            {"--set KEY=VALUE  sets a key over the file, value in YAML (bodies.0.density=500)",
+            {"--set KEY=VALUE  sets a key over the file, value in YAML (bodies.0.density=500);",
+             "                 KEY= takes it back to its default",
              fmt::format("--out DIR        output directory, default {}",
                          default_directory(info, "CONFIG")),
              "--threads N      threads, default what OpenMP takes (OMP_NUM_THREADS)",

@@ -76,6 +76,25 @@ TEST(ModelFile, ReadsBackToTheSameBitsInBothForms) {
   }
 }
 
+TEST(ModelFile, NumbersBeyondSenseAreNamed) {
+  const testing::Scratch scratch;
+  const auto error = [&](const ModelFile& model) {
+    write_model(scratch.file("m.h5"), model);
+    return testing::without_directory(testing::error_of([&] { read_model(scratch.file("m.h5")); }),
+                                      scratch.path());
+  };
+  ModelFile model = example();
+  model.latents[2] = 1e300;
+  EXPECT_EQ(error(model),
+            "m.h5: /latents/z: expected numbers of at most 1e+06 either way, found 1e+300 at "
+            "position 2");
+  model = example();
+  model.weights.stress.layers[1].bias[0] = -1e300;
+  EXPECT_EQ(error(model),
+            "m.h5: /stress/layer_1/bias: expected numbers of at most 1e+06 either way, found "
+            "-1e+300 at position 0");
+}
+
 TEST(ModelFile, SinglePrecisionRoundsTheWeightsOnly) {
   const testing::Scratch scratch;
   const ModelFile written = example();
