@@ -21,9 +21,10 @@ struct TrajectoryPart {
 /// `<directory>/<trajectory>.h5`
 std::filesystem::path part_path(const std::filesystem::path& directory, std::int64_t trajectory);
 
-/// Written under a temporary name first: a part is whole or not there.
+/// Written under a temporary name first and sealed (seal.hpp): a part is whole or not there.
 void write_part(const std::filesystem::path& file, const TrajectoryPart& part);
-/// Nothing where there is no such file. Throws Error for a file that is no part.
+/// Nothing where there is no such file. Throws Error for a file that is no part, is damaged, or holds
+/// numbers that are not finite.
 std::optional<TrajectoryPart> read_part(const std::filesystem::path& file);
 
 }  // namespace uniphy

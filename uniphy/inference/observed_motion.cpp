@@ -10,6 +10,7 @@
 
 #include "ops/kernels/base/error.hpp"
 #include "ops/kernels/rollout/rollout.hpp"
+#include "uniphy/scene/grid_memory.hpp"
 
 namespace uniphy {
 namespace {
@@ -86,6 +87,7 @@ kernels::GridSettings observed_grid(const Observation& observation, const std::s
   grid.bound = observation.bound;
   try {
     grid.check();
+    check_grid_memory("grid", grid.n, sizeof(double));
   } catch (const Error& error) {
     throw Error(fmt::format("{}: /scene: {}", name, error.what()));
   }

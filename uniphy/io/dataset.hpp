@@ -80,7 +80,8 @@ class DatasetWriter {
   std::int64_t samples_ = 0;
 };
 
-/// Checks format, shapes, finite samples, the order of /samples/trajectory.
+/// Checks format, shapes, finite samples of a sensible size, the order of /samples/trajectory, and
+/// that every trajectory has samples.
 Dataset read_dataset(const std::filesystem::path& file);
 
 }  // namespace uniphy

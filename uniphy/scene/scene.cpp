@@ -1,8 +1,6 @@
 #include "uniphy/scene/scene.hpp"
 
 #include <fmt/format.h>
-#include <sys/resource.h>
-#include <sys/sysinfo.h>
 
 #include <algorithm>
 #include <array>
@@ -11,6 +9,7 @@
 #include <numeric>
 
 #include "ops/kernels/base/error.hpp"
+#include "uniphy/scene/grid_memory.hpp"
 #include "uniphy/scene/overlap.hpp"
 
 namespace uniphy {
@@ -29,33 +28,6 @@ void check_settings(const SceneDescription& scene) {
   if (scene.dt && !(std::isfinite(*scene.dt) && *scene.dt > 0)) {
     throw Error(fmt::format("scene: dt: expected a positive number, found {}", *scene.dt));
   }
-}
-
-/// Bytes that a process can have at all: memory and swap, or less where it is limited (ulimit -v).
-double largest_memory() {
-  struct sysinfo machine = {};
-  double bytes = std::numeric_limits<double>::infinity();
-  if (::sysinfo(&machine) == 0) {
-    bytes = (static_cast<double>(machine.totalram) + static_cast<double>(machine.totalswap)) *
-            machine.mem_unit;
-  }
-  rlimit limit = {};
-  if (::getrlimit(RLIMIT_AS, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY) {
-    bytes = std::min(bytes, static_cast<double>(limit.rlim_cur));
-  }
-  return bytes;
-}
-
-/// Before it is taken: what the nodes of the grid take up.
-void check_memory(const SceneDescription& scene) {
-  const double bytes = static_cast<double>(kernels::grid_size(scene.grid.n)) *
-                       (scene.single_precision ? sizeof(float) : sizeof(double));
-  const double largest = largest_memory();
-  if (bytes <= largest) return;
-  throw Error(
-      fmt::format("scene.grid: {} nodes a side take {:.3g} GB, expected at most {:.3g} GB, "
-                  "which is all that there is",
-                  scene.grid.n, 1e-9 * bytes, 1e-9 * largest));
 }
 
 // The planes of the walls that act: the innermost nodes whose velocity is clamped, as far as a
@@ -174,7 +146,8 @@ PlacedScene place_scene(const SceneDescription& scene) {
   placed.grid = scene.grid;
   if (scene.dt) placed.grid.dt = *scene.dt;
   placed.grid.check();
-  check_memory(scene);
+  check_grid_memory("scene.grid", scene.grid.n,
+                    scene.single_precision ? sizeof(float) : sizeof(double));
   placed.first.push_back(0);
   double stable = std::numeric_limits<double>::infinity();
   std::vector<BodyDescription> bodies = scene.bodies;
