@@ -66,8 +66,8 @@ void check(const Observation& observation, const Fail& fail) {
         fmt::format("expected 1 to {} nodes, found {}", (observation.grid - 1) / 2,
                     observation.bound));
   scene(observation.density >= kLeastDensity && observation.density <= kLargestDensity, "density",
-        fmt::format("expected {} to {} kg/m^3, found {}", kLeastDensity, kLargestDensity,
-                    observation.density));
+        fmt::format("expected a density of {} to {} kg/m^3, found {}", kLeastDensity,
+                    kLargestDensity, observation.density));
   for (const double g : observation.gravity) {
     scene(std::abs(g) <= kLargestGravity, "gravity",
           fmt::format("expected at most {} m/s^2 either way, found {}", kLargestGravity, g));

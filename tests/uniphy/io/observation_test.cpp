@@ -71,7 +71,7 @@ TEST(Observation, ImpossibleValuesAreRefused) {
        [](Observation& o) { o.walls = "sticky"; }},
       {"o.h5: attribute bound of /scene: expected 1 to 15 nodes, found 16",
        [](Observation& o) { o.bound = 16; }},
-      {"o.h5: attribute density of /scene: expected 0.001 to 1000000 kg/m^3, found -1",
+      {"o.h5: attribute density of /scene: expected a density of 0.001 to 1000000 kg/m^3, found -1",
        [](Observation& o) { o.density = -1; }},
       {"o.h5: attribute gravity of /scene: expected at most 10000000 m/s^2 either way, found nan",
        [](Observation& o) { o.gravity[2] = std::nan(""); }},
@@ -80,7 +80,8 @@ TEST(Observation, ImpossibleValuesAreRefused) {
        [](Observation& o) { o.bound = 1 << 30; }},
       {"o.h5: attribute dt of /scene: expected a time step in [1e-09, 1) s, found 1e-300",
        [](Observation& o) { o.dt = 1e-300; }},
-      {"o.h5: attribute density of /scene: expected 0.001 to 1000000 kg/m^3, found 1e+300",
+      {"o.h5: attribute density of /scene: expected a density of 0.001 to 1000000 kg/m^3, found "
+       "1e+300",
        [](Observation& o) { o.density = 1e300; }},
       {"o.h5: attribute gravity of /scene: expected at most 10000000 m/s^2 either way, found "
        "1e+300",
