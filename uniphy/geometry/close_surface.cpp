@@ -4,15 +4,14 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <memory>
 #include <numeric>
 #include <tuple>
 #include <unordered_map>
 #include <utility>
 
 #include "ops/kernels/base/error.hpp"
+#include "uniphy/geometry/mesh_part.hpp"
 #include "uniphy/geometry/polygon_mesh.hpp"
-#include "uniphy/geometry/winding_number.hpp"
 
 namespace uniphy {
 namespace {
@@ -54,16 +53,6 @@ struct Side {
   }
 };
 
-struct Part {
-  Index face = 0;  ///< the first of it
-  std::size_t faces = 0;
-  double hole = 0;  ///< m²
-  TriangleMesh mesh;
-  std::unordered_map<Index, Index> corner;  ///< vertex of `mesh` by that of the whole
-  Bounds bounds;
-  double volume = 0;  ///< signed, m³
-};
-
 class Closing {
  public:
   explicit Closing(const PolygonMesh& mesh)
@@ -78,9 +67,11 @@ class Closing {
     collect_sides();
     orient_faces();
     close_holes();
-    std::vector<Part> parts = make_parts();
-    orient_parts(parts);
-    for (const Part& part : parts) {
+    std::vector<MeshPart> parts = make_parts();
+    orient_parts(parts, [&](const MeshPart& part, const std::string& text) {
+      warn(at(part.face) + ": the part from here on " + text);
+    });
+    for (const MeshPart& part : parts) {
       const Index before = Index(out_.mesh.vertices.size());
       for (const auto& [a, b, c] : part.mesh.triangles) {
         out_.mesh.triangles.push_back({before + a, before + b, before + c});
@@ -237,20 +228,20 @@ class Closing {
     }
   }
 
-  std::vector<Part> make_parts() {
-    std::map<Index, Part> by_face;
-    const auto corner = [&](Part& part, Index vertex) {
+  std::vector<MeshPart> make_parts() {
+    std::map<Index, MeshPart> by_face;
+    const auto corner = [&](MeshPart& part, Index vertex) {
       const auto [entry, added] = part.corner.try_emplace(vertex, Index(part.mesh.vertices.size()));
       if (added) part.mesh.vertices.push_back(vertices_[vertex]);
       return entry->second;
     };
-    const auto add = [&](Part& part, Index a, Index b, Index c) {
+    const auto add = [&](MeshPart& part, Index a, Index b, Index c) {
       if (!has_area(vertices_[a], vertices_[b], vertices_[c])) return;
       part.mesh.triangles.push_back({corner(part, a), corner(part, b), corner(part, c)});
     };
     for (std::size_t f = 0; f < mesh_.faces.size(); ++f) {
       const auto& face = mesh_.faces[f];
-      Part& part = by_face[sets_.of(Index(f))];
+      MeshPart& part = by_face[sets_.of(Index(f))];
       part.face = sets_.of(Index(f));
       ++part.faces;
       // A fan: right for any flat polygon, convex or not, as what it covers twice cancels out.
@@ -260,14 +251,14 @@ class Closing {
       }
     }
     for (const auto& [face, lid] : lids_) {
-      Part& part = by_face.at(face);
+      MeshPart& part = by_face.at(face);
       const std::size_t before = part.mesh.triangles.size();
       add(part, lid[0], lid[1], lid[2]);
       if (part.mesh.triangles.size() == before) continue;
       const Vector3d &a = vertices_[lid[0]], &b = vertices_[lid[1]], &c = vertices_[lid[2]];
       part.hole += 0.5 * (b - a).cross(c - a).norm();
     }
-    std::vector<Part> parts;
+    std::vector<MeshPart> parts;
     for (auto& [face, part] : by_face) {
       check(part);
       parts.push_back(std::move(part));
@@ -275,7 +266,7 @@ class Closing {
     return parts;
   }
 
-  void check(Part& part) {
+  void check(MeshPart& part) {
     if (part.mesh.triangles.empty()) fail(part.face, "the faces from here on have no area");
     part.bounds = part.mesh.bounds();
     part.volume = part.mesh.signed_volume();
@@ -293,77 +284,6 @@ class Closing {
       warn(fmt::format("{}: holes in {}, {:.2g} % of its surface, are closed flat", at(part.face),
                        what, 100 * part.hole / area));
     }
-  }
-
-  /// Outwards, but for parts within another, which keep their orientation relative to it.
-  void orient_parts(std::vector<Part>& parts) {
-    const std::size_t count = parts.size();
-    std::vector<std::size_t> outermost(count);
-    std::iota(outermost.begin(), outermost.end(), std::size_t{0});
-    const auto larger = [&](std::size_t a, std::size_t b) {
-      return std::abs(parts[a].volume) > std::abs(parts[b].volume);
-    };
-    for (std::size_t outer = 0; outer < count; ++outer) {
-      std::unique_ptr<WindingNumber> winding;  // made where it is needed
-      for (std::size_t inner = 0; inner < count; ++inner) {
-        const Bounds &in = parts[inner].bounds, &out = parts[outer].bounds;
-        if (!larger(outer, inner) || (in.min.array() < out.min.array()).any() ||
-            (in.max.array() > out.max.array()).any()) {
-          continue;
-        }
-        if (!winding) winding = std::make_unique<WindingNumber>(parts[outer].mesh);
-        if (is_within(parts[inner], *winding) && larger(outer, outermost[inner])) {
-          outermost[inner] = outer;
-        }
-      }
-    }
-    std::vector<double> sign;
-    bool all_inwards = true;
-    for (std::size_t k = 0; k < count; ++k) {
-      sign.push_back(parts[k].volume * parts[outermost[k]].volume > 0 ? 1 : -1);
-      if (outermost[k] == k) all_inwards = all_inwards && parts[k].volume < 0;
-    }
-    for (std::size_t k = 0; k < count; ++k) {
-      Part& part = parts[k];
-      if ((part.volume > 0) != (sign[k] > 0)) {
-        for (auto& triangle : part.mesh.triangles) std::swap(triangle[1], triangle[2]);
-        if (outermost[k] == k && !all_inwards) {
-          warn(at(part.face) + ": the part from here on looks inwards and was turned");
-        }
-      }
-    }
-    for (std::size_t k = 0; k < count; ++k) {
-      const Part& part = parts[k];
-      if (outermost[k] != k && sign[k] > 0 && is_filled(parts, k)) {
-        warn(at(part.face) +
-             ": the part from here on lies within another and is oriented alike: "
-             "it adds nothing (turn its faces for a cavity)");
-      }
-    }
-  }
-
-  /// Whether the other parts, oriented, fill the space that a part stands in.
-  static bool is_filled(const std::vector<Part>& parts, std::size_t k) {
-    const Vector3d p = parts[k].mesh.vertices[0];
-    double sum = 0;
-    for (std::size_t other = 0; other < parts.size(); ++other) {
-      const Bounds& box = parts[other].bounds;
-      if (other == k || (p.array() < box.min.array()).any() || (p.array() > box.max.array()).any())
-        continue;
-      sum += WindingNumber(parts[other].mesh).exact(p);
-    }
-    return sum > 0.5;
-  }
-
-  static bool is_within(const Part& part, const WindingNumber& winding) {
-    constexpr std::size_t kProbes = 64;
-    const std::size_t step = std::max<std::size_t>(1, part.mesh.triangles.size() / kProbes);
-    for (std::size_t k = 0; k < part.mesh.triangles.size(); k += step) {
-      const auto& [a, b, c] = part.mesh.triangles[k];
-      const auto& v = part.mesh.vertices;
-      if (std::abs(winding((v[a] + v[b] + v[c]) / 3)) < 0.5) return false;
-    }
-    return true;
   }
 
   const PolygonMesh& mesh_;

@@ -10,6 +10,7 @@
 #include "tests/uniphy/support/scratch.hpp"
 #include "uniphy/identify/identify.hpp"
 #include "uniphy/inference/infer_run.hpp"
+#include "uniphy/io/atomic_file.hpp"
 
 namespace uniphy {
 namespace {
@@ -128,6 +129,19 @@ TEST(BadState, ThatIsNoStateIsRefused) {
   EXPECT_THAT(testing::error_of([&] { fit.run(); }), HasSubstr("state.h5"));
   write_observation(fit.hooks.state_file, fit.observation);
   EXPECT_THAT(testing::error_of([&] { fit.run(); }), HasSubstr("uniphy-fit-state"));
+}
+
+// What a full disk left once: zeros in the candidates, taken up again as another material.
+TEST(BadState, ThatLostItsNumbersIsRefused) {
+  Interrupted fit;
+  const FitState good = read_fit_state(fit.hooks.state_file, "abc");
+  const double loss = good.candidates[0].loss;
+  std::string bytes = read_text_file(fit.hooks.state_file);
+  const std::size_t at = bytes.find(std::string(reinterpret_cast<const char*>(&loss), sizeof loss));
+  ASSERT_NE(at, bytes.npos);
+  bytes.replace(at, 64, 64, '\0');
+  fit.scratch.write("state.h5", bytes);
+  EXPECT_THAT(testing::error_of([&] { fit.run(); }), HasSubstr("its checksum does not fit"));
 }
 
 TEST(BadState, WithANumberOutOfPlaceIsRefused) {
