@@ -131,6 +131,9 @@ class Section {
   /// For two keys that have been read and exclude each other: throws Error where both are given,
   /// and leaves the one that does not count (`key`, where neither is given) out of resolved().
   void one_of(const std::string& key, const std::string& other);
+  /// For keys that have been read and do not count beside another one: throws Error where one of
+  /// them is given, and leaves them out of resolved().
+  void none_of(const std::vector<std::string>& keys, const std::string& beside);
 
   /// A nested map; where it is absent all its keys take their defaults.
   Section section(const std::string& key, const std::string& doc);
@@ -148,6 +151,8 @@ class Section {
   bool describing() const;
   /// Whether the document gives this key (always false while describing).
   bool has(const std::string& key) const;
+  /// Whether the document gives this key with this plain text.
+  bool says(const std::string& key, const std::string& text) const;
   /// "bodies.0.law", empty for the root.
   const std::string& path() const { return path_; }
   /// The error of a value that only the caller can judge: `file:line: path.key: message`.
@@ -167,6 +172,8 @@ class Section {
   };
 
   std::string full_path(const std::string& key) const;
+  /// Takes a key that was read and is not given out of resolved().
+  void forget(const std::string& key);
   /// `kind`: what is expected there.
   std::filesystem::path existing_path(const std::string& key, const Default<std::string>& fallback,
                                       const std::string& kind, const std::string& doc);

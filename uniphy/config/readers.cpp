@@ -245,12 +245,27 @@ void Section::one_of(const std::string& key, const std::string& other) {
     fail(key, fmt::format("expected this or {}, found both ({}: {})", full_path(other),
                           second->origin, second->found()));
   }
-  const std::string& unused = first ? other : key;
-  if (state_->describing || given_->find(unused)) return;
+  forget(first ? other : key);
+}
+
+void Section::none_of(const std::vector<std::string>& keys, const std::string& beside) {
+  for (const std::string& key : keys) {
+    if (has(key)) fail(key, fmt::format("expected this or {}, found both", full_path(beside)));
+    forget(key);
+  }
+}
+
+bool Section::says(const std::string& key, const std::string& text) const {
+  const auto node = given_->find(key);
+  return node && node->kind == Node::Kind::scalar && !node->quoted && node->text == text;
+}
+
+void Section::forget(const std::string& key) {
+  if (state_->describing || has(key)) return;
   auto& read = resolved_->entries;
   read.erase(std::find_if(read.begin(), read.end(),
-                          [&](const auto& entry) { return entry.first == unused; }));
-  state_->absent.push_back(full_path(unused));
+                          [&](const auto& entry) { return entry.first == key; }));
+  state_->absent.push_back(full_path(key));
 }
 
 std::vector<double> Section::reals_of(const std::string& key,

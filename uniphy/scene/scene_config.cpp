@@ -88,11 +88,11 @@ SceneSource read_scene(Section& config, bool with_laws) {
       section.fail("name", fmt::format("expected a name of its own, found \"{}\" again",
                                        body.description.name));
     }
-    for (const char* key : {"center", "rotation", "size"}) {
-      if (section.has(key)) body.placed_by.push_back(key);
-    }
     Section shape = section.section("shape", "what the body looks like");
     body.shape = read_shape(shape);
+    if (shape.says("in_place", "true")) {
+      section.none_of({"center", "rotation", "size", "on_floor"}, "shape.in_place");
+    }
     Section filling = section.section("filling", "the particles that it is made of");
     body.description.filling = read_filling(filling);
     if (with_laws) {
@@ -118,12 +118,6 @@ SceneDescription SceneSource::load() const {
     BodyDescription body = source.description;
     try {
       source.shape(&body);
-      if (body.in_place && body.on_floor) {
-        throw Error("expected in_place: true or on_floor: true, found both");
-      }
-      if (body.in_place && !source.placed_by.empty()) {
-        throw Error(fmt::format("expected in_place: true or {}, found both", source.placed_by[0]));
-      }
       if (with_laws_) body.law = source.law.load();
     } catch (const Error& error) {
       throw Error(fmt::format("body \"{}\": {}", body.name, error.what()));

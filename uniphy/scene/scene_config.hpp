@@ -23,7 +23,6 @@ class SceneSource {
     BodyDescription description;
     ShapeLoader shape;
     LawSource law;
-    std::vector<std::string> placed_by;  ///< keys of the placement that the document gives
   };
   SceneDescription settings_;
   std::vector<BodySource> bodies_;

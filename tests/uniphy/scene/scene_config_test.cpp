@@ -109,6 +109,36 @@ TEST(ReadScene, DurationAndStepsExcludeEachOther) {
   }
 }
 
+TEST(ReadScene, InPlaceAndThePlacementExcludeEachOther) {
+  const std::string file = testing::TempDir() + "uniphy_in_place.csv";
+  std::ofstream(file) << "0.5 0.5 0.5\n0.6 0.5 0.5\n";
+  const std::string text = "bodies:\n  - shape: {type: particles, file: " + file +
+                           ", particle_volume: 1e-4, in_place: true}\n"
+                           "    law: {type: water, lambda: 1e4}\n";
+  const auto resolved = [&](const std::vector<std::string>& overrides) {
+    const Config config = Config::parse(text, "scene.yaml", overrides);
+    Section root = config.root();
+    read_scene(root);
+    config.finish();
+    return config.resolved();
+  };
+  const std::string once = resolved({});
+  EXPECT_EQ(once.find("size:"), once.npos);
+  load(once);  // a run's configuration can be run again
+  for (const char* key : {"center", "rotation", "size", "on_floor"}) {
+    try {
+      resolved({std::string("bodies.0.") + key +
+                (key[0] == 'o'   ? "=true"
+                 : key[0] == 's' ? "=0.3"
+                                 : "=[1, 2, 3]")});
+      FAIL() << key;
+    } catch (const Error& error) {
+      EXPECT_THAT(error.what(), HasSubstr(key));
+    }
+  }
+  std::filesystem::remove(file);
+}
+
 TEST(ReadScene, RefusesNumbersBeyondPhysics) {
   for (const char* override :
        {"bodies.0.density=1e300", "scene.dt=1e-300", "scene.gravity.1=1e300"}) {
