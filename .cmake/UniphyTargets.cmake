@@ -57,7 +57,8 @@ function(uniphy_test)
 endfunction()
 
 # One precompiled torch/torch.h (20 s per translation unit without it) for every target that
-# includes it; their flags must agree, so all of them compile with OpenMP.
+# includes it; their flags must agree, so all of them compile with OpenMP and, because some make up
+# a shared library, with -fPIC.
 function(uniphy_use_torch_pch target)
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_GREATER_EQUAL 13)
     # False alarms on the std::vector<bool> inside torch::autograd::Function::apply.
@@ -72,8 +73,10 @@ function(uniphy_use_torch_pch target)
     add_library(uniphy_torch_pch OBJECT "${PROJECT_BINARY_DIR}/pch/uniphy_torch_pch.cpp")
     target_compile_features(uniphy_torch_pch PUBLIC cxx_std_17)
     target_link_libraries(uniphy_torch_pch PRIVATE uniphy_torch OpenMP::OpenMP_CXX)
+    target_compile_options(uniphy_torch_pch PRIVATE -fPIC)
     target_precompile_headers(uniphy_torch_pch PRIVATE <torch/torch.h>)
   endif()
+  target_compile_options(${target} PRIVATE -fPIC)
   target_precompile_headers(${target} REUSE_FROM uniphy_torch_pch)
 endfunction()
 if(UNIPHY_TESTS)
@@ -88,7 +91,8 @@ function(uniphy_add_isa target isa)
     return()
   endif()
   add_library(${target}_${isa} OBJECT ${uniphy_isa_sources})
-  foreach(property COMPILE_OPTIONS INCLUDE_DIRECTORIES COMPILE_DEFINITIONS LINK_LIBRARIES)
+  foreach(property COMPILE_OPTIONS INCLUDE_DIRECTORIES COMPILE_DEFINITIONS LINK_LIBRARIES
+                   POSITION_INDEPENDENT_CODE CXX_VISIBILITY_PRESET VISIBILITY_INLINES_HIDDEN)
     get_target_property(value ${target} ${property})
     if(value)
       set_target_properties(${target}_${isa} PROPERTIES ${property} "${value}")
