@@ -9,6 +9,7 @@ packages=(
   libcli11-dev libspdlog-dev libfmt-dev
   libgtest-dev libgmock-dev libbenchmark-dev
   gnuplot-nox  # the charts and pictures of the reports
+  python3-torch python3-h5py  # torch.ops.uniphy in tests/python, experiments/algorithm2.py
 )
 
 if ! command -v apt-get >/dev/null || ! command -v dpkg-query >/dev/null; then
