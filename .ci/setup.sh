@@ -21,6 +21,7 @@ fi
 for prefix in ${Torch_DIR:+"$Torch_DIR"} $(tr ':;' '  ' <<<"${CMAKE_PREFIX_PATH:-}"); do
   if [[ -e "$prefix/TorchConfig.cmake" || -e "$prefix/share/cmake/Torch/TorchConfig.cmake" ]]; then
     packages=("${packages[@]/libtorch-dev/}")
+    packages=("${packages[@]/python3-torch/}")  # belongs to Debian's
   fi
 done
 # gnuplot with windows (gnuplot-qt, gnuplot-x11) will do as well.
