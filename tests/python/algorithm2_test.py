@@ -16,12 +16,12 @@ class Algorithm2(unittest.TestCase):
         with open(script) as lines:
             self.assertLessEqual(len(list(lines)), 40)
         with tempfile.TemporaryDirectory() as directory:
-            observation = observe(directory, 250, "bodies.0.filling.count=6")
-            text = subprocess.run([sys.executable, script, LIBRARY, MODEL, observation, "8"],
+            observation = observe(directory, 500, "bodies.0.filling.count=6")
+            text = subprocess.run([sys.executable, script, LIBRARY, MODEL, observation, "12"],
                                   check=True, stdout=subprocess.PIPE, text=True).stdout
         print(text)
         epochs = re.findall(r"epoch \d+: (\S+) m², nearest code \d+ \((\w+)\)", text)
-        self.assertEqual(len(epochs), 8)
+        self.assertEqual(len(epochs), 12)
         self.assertLess(float(epochs[-1][0]), 0.1 * float(epochs[0][0]))
         self.assertEqual(epochs[-1][1], "elastic")
 
