@@ -1,9 +1,8 @@
 // What Python has to find to the bit: the loss of a roll-out of a trained law against an
-// observation and its gradient by z and by the weights, from the same op in C++.
+// observation and its gradient, from the same op in C++.
 //   uniphy_rollout_gradient MODEL OBSERVATION CODE float32|float64 EPOCHS
-// Prints the loss, the gradient by z and the sums of those by the networks' numbers, as hexadecimal
-// numbers, then, where EPOCHS > 0, the seconds of the fastest of so many epochs of Algorithm 2
-// (roll-out, loss, gradient by z, step of Adam).
+// Prints the loss and the gradient by z, hexadecimal, then, where EPOCHS > 0, the seconds of the
+// fastest of so many epochs of Algorithm 2 (roll-out, loss, gradient by z, step of Adam).
 
 #include <torch/torch.h>
 
