@@ -2,9 +2,7 @@
 
 import unittest
 
-import torch
-
-from support import message_of, ops, random_networks
+from support import message_of, ops, random_networks, torch
 
 F = torch.eye(3, dtype=torch.float64).repeat(4, 1, 1)
 x = torch.full((4, 3), 0.5, dtype=torch.float64)

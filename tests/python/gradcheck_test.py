@@ -6,9 +6,7 @@ suits all, and results are divided by their size. Inputs are random: none stands
 
 import unittest
 
-import torch
-
-from support import ANALYTIC_LAWS, ops, random_networks
+from support import ANALYTIC_LAWS, ops, random_networks, torch
 
 
 def normal(*sizes, scale=1.0):

@@ -5,9 +5,7 @@ import subprocess
 import tempfile
 import unittest
 
-import torch
-
-from support import BINARY, MODEL, observe, ops, read_observation, trained_networks
+from support import BINARY, MODEL, observe, ops, read_observation, torch, trained_networks
 
 
 def found_by_cpp(observation, code, dtype):
