@@ -15,7 +15,7 @@ for name in ("projection", "stress"):  # one tensor: weight and bias of each lay
 x, volume = tensor(seen["x"]), tensor(seen["volume"])
 scene = {k: v.decode() if k == "walls" else v.tolist() for k, v in seen["scene"].attrs.items()}
 grid = {"n": scene["grid"], **{k: scene[k] for k in ("dt", "gravity", "walls", "bound")}}
-every = round((seen["time"][1] - seen["time"][0]) / scene["dt"])  # steps from frame to frame
+every = round((seen["time"][1] - seen["time"][0]) / scene["dt"])  # evenly spaced frames
 space = torch.cat([x[0], torch.ones(len(volume), 1)], 1)  # v0 = space @ motion is affine in x0
 motion = (torch.linalg.pinv(space) @ (x[1] - x[0]) / (every * scene["dt"])).requires_grad_()
 def loss_of(z):  # log of the mean squared error of the roll-out (m²)
