@@ -24,10 +24,10 @@ Material material_of(const kernels::LawDescription& law) {
   return material;
 }
 
-Material material_of(kernels::LawId law, const Tensor& parameters) {
+Material material_of(const char* op, kernels::LawId law, const Tensor& parameters) {
   const auto& taken = kernels::law_parameters(law);
-  const auto type = real_type("material", "parameters", parameters);
-  check_tensor("material", "parameters", parameters, type, {std::int64_t(taken.size())});
+  const auto type = real_type(op, "parameters", parameters);
+  check_tensor(op, "parameters", parameters, type, {std::int64_t(taken.size())});
   Material material;
   std::int64_t k = 0;
   for (const kernels::LawParameter& p : taken)

@@ -39,9 +39,10 @@ inline constexpr Parameter Material::*kMaterialMembers[kernels::kLawParameters] 
     &Material::mu, &Material::lambda, &Material::tau_y, &Material::theta, &Material::eta};
 
 /// The material of an analytic law: its numbers; or those of `parameters` [N], in the order of
-/// kernels::law_parameters(law.id), which gradients reach.
+/// kernels::law_parameters(law), which gradients reach. `op` opens the message of the Error where
+/// the length or the type is another.
 Material material_of(const kernels::LawDescription& law);
-Material material_of(kernels::LawId law, const torch::Tensor& parameters);
+Material material_of(const char* op, kernels::LawId law, const torch::Tensor& parameters);
 
 /// All parameters in the order of kernels::kLawParameterTable as one float64 tensor [5];
 /// differentiable. `op` opens the message of the Error where a tensor is not a single

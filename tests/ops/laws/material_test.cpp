@@ -21,7 +21,8 @@ TEST(Material, FromNumbersAndFromAVectorAreTheSame) {
     const LawDescription law = sample_law(id);
     const Tensor packed = ops::pack_material("op", id, ops::material_of(law));
     const Tensor values = torch::tensor(kernels::parameter_values(law), torch::kFloat64);
-    EXPECT_TRUE(torch::equal(ops::pack_material("op", id, ops::material_of(id, values)), packed));
+    EXPECT_TRUE(
+        torch::equal(ops::pack_material("op", id, ops::material_of("op", id, values)), packed));
     for (const kernels::LawParameter& p : kernels::law_parameters(id))
       EXPECT_EQ(packed[p.place].item<double>(), law.*p.member) << p.name;
   }
@@ -30,7 +31,7 @@ TEST(Material, FromNumbersAndFromAVectorAreTheSame) {
 TEST(Material, GradientsReachTheVector) {
   const Tensor values = torch::tensor({1e5, 2e5, 0.3}, torch::kFloat64).set_requires_grad(true);
   const Tensor packed =
-      ops::pack_material("op", LawId::sand, ops::material_of(LawId::sand, values));
+      ops::pack_material("op", LawId::sand, ops::material_of("op", LawId::sand, values));
   (packed * torch::arange(1, 6, torch::kFloat64)).sum().backward();
   // mu, lambda and theta stand at places 0, 1 and 3.
   EXPECT_TRUE(torch::equal(values.grad(), torch::tensor({1.0, 2.0, 4.0}, torch::kFloat64)));
@@ -38,8 +39,8 @@ TEST(Material, GradientsReachTheVector) {
 
 TEST(Material, RefusesAVectorOfAnotherLength) {
   EXPECT_THAT(
-      error_of([] { ops::material_of(LawId::sand, torch::zeros({2}, torch::kFloat64)); }),
-      ::testing::HasSubstr("material: parameters: expected [3] Double on cpu, found [2] Double"));
+      error_of([] { ops::material_of("op", LawId::sand, torch::zeros({2}, torch::kFloat64)); }),
+      ::testing::HasSubstr("op: parameters: expected [3] Double on cpu, found [2] Double"));
 }
 
 }  // namespace
