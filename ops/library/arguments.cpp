@@ -73,22 +73,6 @@ kernels::LawId analytic_law(const char* op, const std::string& name) {
   return law;
 }
 
-Material material_of(const char* op, kernels::LawId law, const torch::Tensor& parameters) {
-  const std::vector<std::string>& names = kernels::parameter_names(law);
-  const auto type = real_type(op, "parameters", parameters);
-  check_tensor(op, "parameters", parameters, type, {std::int64_t(names.size())});
-  Material material;
-  for (std::size_t k = 0; k < names.size(); ++k) {
-    Parameter& to = names[k] == "mu"       ? material.mu
-                    : names[k] == "lambda" ? material.lambda
-                    : names[k] == "tau_y"  ? material.tau_y
-                    : names[k] == "theta"  ? material.theta
-                                           : material.eta;
-    to = parameters.select(0, std::int64_t(k));
-  }
-  return material;
-}
-
 LearnedNetworks learned_networks(const char* op, const std::string& form,
                                  const std::string& activation, at::IntArrayRef projection_widths,
                                  const torch::Tensor& projection, at::IntArrayRef stress_widths,

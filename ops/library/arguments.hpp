@@ -24,8 +24,6 @@ kernels::GridSettings grid_settings(const char* op, std::int64_t n, double dt,
 
 /// An analytic law by its name; the name "learned" is an error.
 kernels::LawId analytic_law(const char* op, const std::string& name);
-/// [N], in the order of kernels::parameter_names(law); gradients go through.
-Material material_of(const char* op, kernels::LawId law, const torch::Tensor& parameters);
 
 /// The keywords of the networks in a schema.
 inline constexpr const char* kNetworkArguments =
