@@ -1,7 +1,6 @@
 #include <torch/torch.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "ops/kernels/base/error.hpp"
 #include "ops/reference/learned_law.hpp"
@@ -66,6 +65,11 @@ kernels::LawDescription description(kernels::LawForm form) {
   return law;
 }
 
+Tensor initial_velocity(const Observation& o) {
+  const std::vector<double> start(o.x.begin(), o.x.begin() + 3 * o.particles);
+  return torch::tensor(benchmark_motion().velocities(start), torch::kFloat64).view({-1, 3});
+}
+
 /// Some steps and their gradient by z, through autograd.
 Measurer::Body plain_steps(const Observation& o, const kernels::LawDescription& law,
                            std::int64_t steps) {
@@ -101,12 +105,18 @@ void bench_epoch(const BenchOptions& options, int threads, BenchReport& report) 
   const Observation observation = observe(options.epoch_side, options.epoch_steps);
   const auto objective = make_motion_objective(observation, observed_steps(observation, "bench"),
                                                observed_grid(observation, "bench"), "float32");
-  const RigidMotion motion = benchmark_motion();
+  const Tensor v0 = initial_velocity(observation);
   for (const auto form : {kernels::LawForm::published, kernels::LawForm::isotropic}) {
     const kernels::LawDescription law = description(form);
+    // As Algorithm 2 does it: z is a leaf, the loss a tensor, the networks are those of one model.
+    ops::RolloutBody body{0, observation.particles, law, torch::tensor(law.z, torch::kFloat64),
+                          ops::to_networks(*law.weights, torch::kFloat64)};
+    body.parameters.requires_grad_();
     const auto epoch = [&] {
-      if (!std::isfinite(objective->evaluate(law, motion, observation.frames).mse)) {
-        throw Error("bench: the roll-out with random weights left the grid");
+      body.parameters.mutable_grad() = Tensor();
+      objective->mse(body, v0, observation.frames).backward();
+      if (!body.parameters.grad().isfinite().all().item<bool>()) {
+        throw Error("bench: the gradient of an epoch with random weights is not finite");
       }
     };
     apply({threads, 1});

@@ -28,18 +28,24 @@ constexpr std::array<std::pair<const char*, double Identified::*>, 7> kNumbers{
      {"seconds", &Identified::wall_s},
      {"memory_mb", &Identified::memory_mb}}};
 
+constexpr std::array<std::pair<const char*, std::size_t Identified::*>, 2> kCounts{
+    {{"roll_outs", &Identified::roll_outs},
+     {"roll_outs_to_a_hundredth", &Identified::roll_outs_to_a_hundredth}}};
+
 }  // namespace
 
 void write_case_result(const std::filesystem::path& folder, const CaseResult& result,
                        const std::string& fingerprint) {
   hdf5::Writer writer(folder / kFile);
   writer.attribute("/", "format", kFormat);
-  writer.attribute("/", "version", 1);
+  writer.attribute("/", "version", 2);
   writer.attribute("/", "fingerprint", fingerprint);
   for (const auto& [name, text] : kTexts) writer.attribute("/", name, result.row.*text);
   for (const auto& [name, number] : kNumbers) writer.attribute("/", name, result.row.*number);
   writer.attribute("/", "beats_other", result.row.beats_other ? 1 : 0);
-  writer.attribute("/", "roll_outs", static_cast<std::int64_t>(result.row.roll_outs));
+  for (const auto& [name, count] : kCounts) {
+    writer.attribute("/", name, static_cast<std::int64_t>(result.row.*count));
+  }
   const std::vector<double>& best = result.pictures.best;
   writer.write("best", best, {static_cast<std::int64_t>(best.size())},
                {"m^2", "best loss so far within each stage, over the roll-outs of the result"});
@@ -50,14 +56,16 @@ std::optional<CaseResult> read_case_result(const std::filesystem::path& folder,
                                            const std::string& fingerprint) {
   if (!std::filesystem::exists(folder / kFile)) return {};
   const hdf5::Reader reader(folder / kFile);
-  reader.check_format(kFormat, 1);
+  if (reader.check_format(kFormat, 2) < 2) return {};
   if (reader.attribute_text("/", "fingerprint") != fingerprint) return {};
   check_seal(folder / kFile);
   CaseResult result;
   for (const auto& [name, text] : kTexts) result.row.*text = reader.attribute_text("/", name);
   for (const auto& [name, number] : kNumbers) result.row.*number = reader.attribute_real("/", name);
   result.row.beats_other = reader.attribute_integer("/", "beats_other") != 0;
-  result.row.roll_outs = static_cast<std::size_t>(reader.attribute_integer("/", "roll_outs"));
+  for (const auto& [name, count] : kCounts) {
+    result.row.*count = static_cast<std::size_t>(reader.attribute_integer("/", name));
+  }
   CasePictures& pictures = result.pictures;
   pictures.material = result.row.material;
   pictures.best = reader.read<double>("best", {-1});

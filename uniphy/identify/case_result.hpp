@@ -18,6 +18,7 @@ struct Identified {
   bool beats_other = false;
   std::string nearest;  ///< material of the nearest training code
   std::size_t roll_outs = 0;
+  std::size_t roll_outs_to_a_hundredth = 0;  ///< see infer_run.hpp; 0 where that was not reached
   double wall_s = 0, memory_mb = 0;
 };
 
@@ -34,7 +35,7 @@ struct CaseResult {
 };
 
 /// The mark of a finished case, case.h5 in its folder: the row and the losses; an interrupted run
-/// takes it up together with the files that stand beside it. Written last, under another name
+/// resumes from it and the files that stand beside it. Written last, under another name
 /// first.
 void write_case_result(const std::filesystem::path& folder, const CaseResult& result,
                        const std::string& fingerprint);

@@ -78,6 +78,7 @@ CaseResult identify_one(const IdentifyOptions& options, std::int64_t material,
   row.fit_mse = result.fit_mse;
   row.fit_share = std::sqrt(result.fit_mse) / result.size;
   row.roll_outs = result.fit.history.size();
+  row.roll_outs_to_a_hundredth = roll_outs_to_a_hundredth(result.fit).value_or(0);
   row.nearest = variables.nearest(result.fit.u, 1).front().material;
   row.other_best = std::numeric_limits<double>::infinity();
   for (int i = 0; i < variables.starts(); ++i) {
@@ -104,9 +105,9 @@ CaseResult identify_one(const IdentifyOptions& options, std::int64_t material,
   return found;
 }
 
-CaseResult taken_up_or_identified(const IdentifyOptions& options, std::int64_t material,
-                                  const FitVariables& variables, const std::string& fingerprint,
-                                  const RunDirectory& out) {
+CaseResult resumed_or_identified(const IdentifyOptions& options, std::int64_t material,
+                                 const FitVariables& variables, const std::string& fingerprint,
+                                 const RunDirectory& out) {
   const std::string name = options.hidden.draw.materials[material].name();
   const std::filesystem::path folder = out.file(name);
   if (auto finished = read_case_result(folder, fingerprint)) {
@@ -129,6 +130,7 @@ void add_row(Metrics& metrics, const Identified& row) {
   set("resim_root_over_size", row.resim_share);
   set("other_best_mse", row.other_best);
   set("roll_outs", static_cast<double>(row.roll_outs));
+  set("roll_outs_to_a_hundredth", static_cast<double>(row.roll_outs_to_a_hundredth));
   set("seconds", row.wall_s);
   set("memory_mb", row.memory_mb);
 }
@@ -201,7 +203,7 @@ void identify(const IdentifyOptions& options, RunDirectory& out, Metrics& metric
     const std::string name = options.hidden.draw.materials[material].name();
     Identified row;
     try {
-      CaseResult found = taken_up_or_identified(options, material, *variables, fingerprint, out);
+      CaseResult found = resumed_or_identified(options, material, *variables, fingerprint, out);
       row = found.row;
       pictures.push_back(std::move(found.pictures));
     } catch (const Error& error) {

@@ -23,8 +23,9 @@ IdentifyOptions read_identify_options(Section& config);
 
 /// Does all materials, prints and writes the table, the pictures and the metrics fit_mse.M,
 /// resim_mse.M, fit_beats_other.M, fit_root_over_size.M, resim_root_over_size.M, other_best_mse.M,
-/// roll_outs.M, seconds.M, memory_mb.M. An interrupted run goes on with the materials that it has
-/// finished. Throws Error at the end where a number is not finite.
+/// roll_outs.M, roll_outs_to_a_hundredth.M (0: not reached), seconds.M, memory_mb.M. An interrupted
+/// run goes on with the materials that it has finished. Throws Error at the end where a number is
+/// not finite.
 void identify(const IdentifyOptions& options, RunDirectory& out, Metrics& metrics);
 
 /// The table in Markdown.

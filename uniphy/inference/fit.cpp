@@ -1,16 +1,19 @@
 #include "uniphy/inference/fit.hpp"
 
 #include <fmt/format.h>
+#include <torch/torch.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <deque>
 #include <limits>
 #include <optional>
 #include <set>
 
 #include "ops/kernels/base/error.hpp"
 #include "ops/kernels/base/for_each.hpp"
+#include "uniphy/inference/descent.hpp"
 #include "uniphy/inference/fit_problem.hpp"
 #include "uniphy/report/interrupt.hpp"
 #include "uniphy/report/progress.hpp"
@@ -60,6 +63,7 @@ class Fit {
     const auto clock = std::chrono::steady_clock::now();
     const bool due = std::chrono::duration<double>(clock - saved_).count() >= hooks_.save_seconds;
     if (!hooks_.state_file.empty() && (now || due || interrupt_requested())) {
+      keep_descents();
       write_fit_state(hooks_.state_file, state_, hooks_.fingerprint);
       saved_ = clock;
     }
@@ -81,7 +85,7 @@ class Fit {
   }
 
   FitCandidate start_candidate(int start, int stage) const {
-    FitCandidate c = problem_.candidate(start, variables_.start(start));
+    FitCandidate c = problem_.candidate(start);
     c.mse = start_mse(start, stage);
     c.loss = problem_.loss(c.mse, c.u);
     return c;
@@ -99,8 +103,7 @@ class Fit {
       const int count = std::min(kBlock, starts - first);
       kernels::for_each(count, [&](int k) {
         const int i = first + k;
-        const auto mse =
-            problem_.frame_mse(problem_.candidate(i, variables_.start(i)), problem_.frames());
+        const auto mse = problem_.frame_mse(problem_.candidate(i), problem_.frames());
         for (int s = 0; s < stages(); ++s) {
           table[i * stages() + s] = mean_of_first(mse, problem_.frames(s));
         }
@@ -121,76 +124,90 @@ class Fit {
     checkpoint(0, true);
   }
 
-  std::vector<std::unique_ptr<Optimizer>> make_optimizers() {
+  void make_descents() {
     const FitStage& now = options_.stages[state_.stage];
-    const OptimizerOptions settings{now.optimizer, now.rate, now.epochs, options_.clip};
-    std::vector<std::unique_ptr<Optimizer>> optimizers;
-    for (FitCandidate& c : state_.candidates) {
-      optimizers.push_back(make_optimizer(settings, problem_.pack(c, state_.stage)));
-      if (state_.epoch > 0) {
-        optimizers.back()->unpack(c.optimizer);
-      } else {
-        optimizers.back()->inherit(c.optimizer);
-        c.reference = kInfinity;
-        c.stalled = 0;
+    const DescentOptions settings{now.optimizer, now.rate, now.epochs, options_.clip,
+                                  options_.patience};
+    const bool same_leaves = state_.stage > 0 && problem_.with_velocity(state_.stage) ==
+                                                     problem_.with_velocity(state_.stage - 1);
+    for (const FitCandidate& c : state_.candidates) {
+      descents_.emplace_back(settings, problem_.leaves(c, state_.stage));
+      if (state_.steps > 0) {
+        resume(descents_.back(), c.optimizer);
+      } else if (same_leaves) {
+        descents_.back().inherit(c.optimizer);
       }
     }
-    return optimizers;
+  }
+
+  void resume(Descent& descent, const std::string& bytes) const {
+    try {
+      descent.load(bytes);
+    } catch (const Error& error) {
+      throw Error(fmt::format("{}: {}", hooks_.state_file.string(), error.what()));
+    }
+  }
+
+  /// The state of the optimizers, for the file and for the next stage.
+  void keep_descents() {
+    for (std::size_t i = 0; i < descents_.size(); ++i) {
+      state_.candidates[i].optimizer = descents_[i].save();
+    }
   }
 
   void improve() {
     const int epochs = options_.stages[state_.stage].epochs;
     const int count = static_cast<int>(state_.candidates.size());
-    const auto optimizers = make_optimizers();
     const std::int64_t work_before = done_;
-    while (state_.epoch < epochs) {
+    make_descents();
+    while (true) {
       std::vector<int> active;
       for (int i = 0; i < count; ++i) {
-        if (state_.candidates[i].stalled < options_.patience) active.push_back(i);
+        if (!descents_[i].done()) active.push_back(i);
       }
       if (active.empty()) break;
-      std::vector<FitRecord> records(active.size());
+      std::vector<std::vector<FitRecord>> records(active.size());
       kernels::for_each(static_cast<int>(active.size()), [&](int k) {
-        FitCandidate& best = state_.candidates[active[k]];
-        Optimizer& optimizer = *optimizers[active[k]];
-        FitCandidate at = problem_.unpack(best.start, optimizer.ask(), state_.stage);
-        const std::vector<double> gradient = problem_.evaluate(at, state_.stage);
-        optimizer.tell(at.loss, gradient);
-        records[k] = {state_.stage, best.start, state_.epoch, problem_.horizon_time(state_.stage),
-                      at.mse};
-        take(best, at);
-        best.optimizer = optimizer.pack();
+        records[k] = step(state_.candidates[active[k]], descents_[active[k]]);
       });
-      ++state_.epoch;
-      for (const FitRecord& record : records) {
-        state_.history.push_back(record);
-        if (hooks_.on_record) hooks_.on_record(record);
+      ++state_.steps;
+      std::int64_t work = 0;
+      for (const auto& of_candidate : records) {
+        work += static_cast<std::int64_t>(of_candidate.size());
+        state_.history.insert(state_.history.end(), of_candidate.begin(), of_candidate.end());
+        if (!hooks_.on_record) continue;
+        for (const FitRecord& record : of_candidate) hooks_.on_record(record);
       }
-      checkpoint(static_cast<std::int64_t>(active.size()), false);
+      checkpoint(work, false);
     }
+    keep_descents();
+    descents_.clear();
     done_ = work_before + std::int64_t(count) * epochs;  // what stopped early counts as done
   }
 
-  /// Keeps the better of `best` and a new evaluation, and counts those that gained next to nothing.
-  static void take(FitCandidate& best, const FitCandidate& at) {
-    if (at.loss < best.loss) {
-      best.u = at.u;
-      best.motion = at.motion;
-      best.loss = at.loss;
-      best.mse = at.mse;
-    }
-    if (best.loss < 0.99 * best.reference) {
-      best.reference = best.loss;
-      best.stalled = 0;
-    } else {
-      ++best.stalled;
-    }
+  /// One step of a candidate's optimizer; keeps the best point in `best`.
+  std::vector<FitRecord> step(FitCandidate& best, Descent& descent) const {
+    std::vector<FitRecord> records;
+    const int before = descent.evaluations();
+    descent.step([&] {
+      const FitProblem::Evaluation at = problem_.evaluate(descent.leaves(), state_.stage);
+      records.push_back({state_.stage, best.start, before + static_cast<int>(records.size()),
+                         problem_.horizon_time(state_.stage), at.mse});
+      if (const double loss = at.loss.item<double>(); loss < best.loss) {
+        best.loss = loss;
+        best.mse = at.mse;
+        best.u = descent.leaves()[0].detach().clone();
+        if (descent.leaves().size() > 1) best.motion = descent.leaves()[1].detach().clone();
+      }
+      return at.loss;
+    });
+    return records;
   }
 
   /// Keeps the best at the next horizon.
   void next_stage() {
     const int next = state_.stage + 1;
-    state_.epoch = 0;
+    state_.steps = 0;
     if (next < stages() && problem_.frames(next) != problem_.frames(state_.stage)) {
       kernels::for_each(static_cast<int>(state_.candidates.size()), [&](int i) {
         FitCandidate& c = state_.candidates[i];
@@ -228,7 +245,6 @@ class Fit {
       if (start_mse(i, stages() - 1) < start_mse(best, stages() - 1)) best = i;
     }
     FitCandidate candidate = start_candidate(best, stages() - 1);
-    candidate.optimizer = state_.candidates.front().optimizer;  // rows of one length in the file
     state_.candidates.push_back(std::move(candidate));
   }
 
@@ -242,8 +258,7 @@ class Fit {
     }
     if (state_.candidates.empty()) fail("expected candidates, found none");
     for (const FitCandidate& c : state_.candidates) {
-      if (c.start < 0 || c.start >= variables_.starts() ||
-          static_cast<int>(c.u.size()) != variables_.size()) {
+      if (c.start < 0 || c.start >= variables_.starts() || c.u.numel() != variables_.size()) {
         fail("a candidate does not fit the model");
       }
     }
@@ -252,8 +267,8 @@ class Fit {
   FitResult result() const {
     const FitCandidate& best = state_.candidates.front();
     FitResult r;
-    r.u = best.u;
-    r.motion = best.motion;
+    r.u.assign(best.u.data_ptr<double>(), best.u.data_ptr<double>() + best.u.numel());
+    r.motion = problem_.motion(best);
     r.mse = best.mse;
     r.start = best.start;
     r.history = state_.history;
@@ -275,6 +290,7 @@ class Fit {
   const FitOptions& options_;
   const FitHooks& hooks_;
   FitState state_;
+  std::deque<Descent> descents_;  ///< of the candidates, while a stage is under way
   std::optional<Progress> progress_;
   std::int64_t done_ = 0;
   std::chrono::steady_clock::time_point saved_ = std::chrono::steady_clock::now();

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <torch/types.h>
+
 #include <filesystem>
 #include <functional>
 #include <string>
@@ -7,22 +9,22 @@
 
 #include "uniphy/inference/fit_variables.hpp"
 #include "uniphy/inference/motion_objective.hpp"
-#include "uniphy/inference/optimizer.hpp"
 
 namespace uniphy {
 
-/// One stage of the schedule: `candidates` points, each improved by `epochs` roll-outs with their
-/// gradients, compared up to the horizon.
+/// One stage of the schedule: `candidates` points, each improved by at most `epochs` roll-outs with
+/// their gradients, compared up to the horizon.
 struct FitStage {
   double horizon = 1;  ///< share of the time from first contact to the last frame, (0, 1]
   int candidates = 1;
   int epochs = 20;
-  std::string optimizer = "bfgs";
-  double rate = 0.1;  ///< see OptimizerOptions, in units of the spread of the training codes
+  std::string optimizer = "lbfgs";
+  double rate = 0.1;  ///< see DescentOptions, in units of the spread of the training codes
 };
 
 struct FitOptions {
   std::string dtype = "float32";
+  std::string rollout = "fused";  ///< or stepwise, see make_motion_objective
   int velocity_frames = 1;       ///< frames after the first that the initial velocity is taken from
   bool refine_velocity = false;  ///< the last stage also fits the initial velocity
   double prior = 0;              ///< weight of ‖z‖²/σ² against mse/size²
@@ -34,20 +36,19 @@ struct FitOptions {
 
 /// A point that is being improved.
 struct FitCandidate {
-  int start = 0;                  ///< row of the starts
-  std::vector<double> u;          ///< best so far in this stage, or where the stage starts
-  RigidMotion motion;             ///< likewise
-  double loss = 0;                ///< of that point: mse/size² and the prior
-  double mse = 0;                 ///< m²
-  double reference = 0;           ///< loss of which the next 1 % have not been gained yet
-  int stalled = 0;                ///< evaluations since then
-  std::vector<double> optimizer;  ///< packed; of the stage before where this one has not begun
+  int start = 0;          ///< row of the starts
+  torch::Tensor u;        ///< best so far in this stage, or where the stage starts
+  torch::Tensor motion;   ///< likewise [6]: what is added to the observed initial velocity, see
+                          ///< FitProblem
+  double loss = 0;        ///< of that point: mse/size² and the prior
+  double mse = 0;         ///< m²
+  std::string optimizer;  ///< Descent::save; of the stage before where this one has not begun
 };
 
-/// Everything that a fit depends on between two evaluations.
+/// Everything that a fit depends on between two steps.
 struct FitState {
   int stage = -1;                 ///< −1: the starts are not ranked yet
-  int epoch = 0;                  ///< next one within the stage
+  int steps = 0;                  ///< of the optimizers, done in this stage
   std::vector<double> start_mse;  ///< [starts, stages] of every start at the stages' horizons
   std::vector<FitCandidate> candidates;
   std::vector<FitRecord> history;
@@ -68,7 +69,7 @@ struct FitHooks {
   std::filesystem::path state_file;  ///< where the fit can be resumed; empty: nowhere
   std::string fingerprint;           ///< of everything that the fit depends on
   double save_seconds = 2;           ///< least time between two saves
-  std::function<void(const FitRecord&)> on_record;  ///< after every evaluation
+  std::function<void(const FitRecord&)> on_record;  ///< for every evaluation, after the step
   bool progress = true;
 };
 
@@ -83,7 +84,11 @@ struct FitHooks {
 ///    whose roll-out fails has infinite loss and goes first.
 /// 4. The best evaluation over all frames is the result.
 ///
-/// Candidates are evaluated side by side; results have the same bits for any number of threads.
+/// A candidate's u, and the initial velocity where it is fitted, are the leaves of a graph that
+/// ends in the loss; backward() reaches them through the op of the roll-out, and an optimizer of
+/// Torch moves them (Descent).
+///
+/// Candidates are improved side by side; results have the same bits for any number of threads.
 /// Throws Error where no start can be simulated up to the first horizon, or where the state file
 /// does not belong to this fit.
 FitResult fit_observation(const Observation& observation, const std::string& name,

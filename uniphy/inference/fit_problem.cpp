@@ -1,6 +1,7 @@
 #include "uniphy/inference/fit_problem.hpp"
 
 #include <fmt/format.h>
+#include <torch/torch.h>
 
 #include <cmath>
 #include <limits>
@@ -9,6 +10,10 @@
 
 namespace uniphy {
 namespace {
+
+using torch::Tensor;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // Units in which the initial velocity is refined, beside u which is of order one.
 constexpr double kLinearUnit = 0.1;   // m/s
@@ -27,11 +32,18 @@ FitProblem::FitProblem(const Observation& observation, const std::string& name,
       size_(observed_size(observation)),
       motion_(observed_motion(observation, steps_, grid_, options.velocity_frames)),
       contact_(first_contact(observation, steps_, grid_, motion_)),
-      objective_(make_motion_objective(observation, steps_, grid_, options.dtype)) {
+      objective_(
+          make_motion_objective(observation, steps_, grid_, options.dtype, options.rollout)) {
   if (options.stages.empty() || options.stages.back().horizon < 1) {
     throw Error("stages: expected a last stage with horizon 1");
   }
   kernels::make_law<double>(variables.law(variables.start(0)));  // a model that does not fit: now
+  const std::vector<double> x(observation.x.begin(),
+                              observation.x.begin() + 3 * observation.particles);
+  v0_ = torch::tensor(motion_.velocities(x), torch::kFloat64).view({-1, 3});
+  const Eigen::Vector3d& centre = motion_.centre;
+  arm_ = torch::tensor(x, torch::kFloat64).view({-1, 3}) -
+         torch::tensor({centre[0], centre[1], centre[2]}, torch::kFloat64);
 }
 
 std::ptrdiff_t FitProblem::frames(int stage) const {
@@ -42,66 +54,73 @@ double FitProblem::horizon_time(int stage) const {
   return static_cast<double>(steps_.last(frames(stage))) * grid_.dt;
 }
 
-FitCandidate FitProblem::candidate(int start, const std::vector<double>& u) const {
+FitCandidate FitProblem::candidate(int start) const {
   FitCandidate c;
   c.start = start;
-  c.u = u;
-  c.motion = motion_;
+  c.u = torch::tensor(variables_.start(start), torch::kFloat64);
+  c.motion = torch::zeros({6}, torch::kFloat64);
   return c;
 }
 
-double FitProblem::prior_weight() const {
-  return options_.prior / (options_.prior_sigma * options_.prior_sigma);
-}
-
-double FitProblem::loss(double mse, const std::vector<double>& u) const {
-  const double weight = prior_weight();
-  return mse / (size_ * size_) + (weight > 0 ? weight * variables_.prior(u, 0, nullptr) : 0);
+RigidMotion FitProblem::motion(const FitCandidate& c) const {
+  RigidMotion m = motion_;
+  const double* change = c.motion.data_ptr<double>();
+  for (int k = 0; k < 3; ++k) {
+    m.linear[k] += kLinearUnit * change[k];
+    m.angular[k] += kAngularUnit * change[3 + k];
+  }
+  return m;
 }
 
 std::vector<double> FitProblem::frame_mse(const FitCandidate& c, std::ptrdiff_t frames) const {
-  return objective_->frame_mse(variables_.law(c.u), c.motion, frames);
+  return objective_->frame_mse(variables_.law(c.u), motion(c), frames);
 }
 
-std::vector<double> FitProblem::evaluate(FitCandidate& c, int stage) const {
-  const Evaluation e = objective_->evaluate(variables_.law(c.u), c.motion, frames(stage));
-  c.mse = e.mse;
-  c.loss = std::isfinite(e.mse) ? loss(e.mse, c.u) : std::numeric_limits<double>::infinity();
-  if (!std::isfinite(c.loss)) return {};
-  std::vector<double> g = variables_.gradient(c.u, e.parameters);
-  const double unit = 1 / (size_ * size_);
-  for (double& x : g) x *= unit;
-  if (prior_weight() > 0) variables_.prior(c.u, prior_weight(), &g);
-  if (with_velocity(stage)) {
-    for (int k = 0; k < 6; ++k) {
-      g.push_back(unit * (k < 3 ? kLinearUnit : kAngularUnit) * e.motion[k]);
-    }
-  }
-  return g;
+Tensor FitProblem::loss_of(const Tensor& mse, const Tensor& u) const {
+  const Tensor loss = mse / (size_ * size_);
+  const double weight = options_.prior / (options_.prior_sigma * options_.prior_sigma);
+  const Tensor prior = weight > 0 ? variables_.prior(u) : Tensor();
+  return prior.defined() ? loss + weight * prior : loss;
+}
+
+double FitProblem::loss(double mse, const Tensor& u) const {
+  torch::NoGradGuard no_grad;
+  return loss_of(torch::scalar_tensor(mse, torch::kFloat64), u).item<double>();
 }
 
 bool FitProblem::with_velocity(int stage) const {
   return options_.refine_velocity && stage + 1 == stages();
 }
 
-std::vector<double> FitProblem::pack(const FitCandidate& c, int stage) const {
-  std::vector<double> w = c.u;
-  if (!with_velocity(stage)) return w;
-  const Eigen::Vector3d linear = (c.motion.linear - motion_.linear) / kLinearUnit;
-  const Eigen::Vector3d angular = (c.motion.angular - motion_.angular) / kAngularUnit;
-  w.insert(w.end(), linear.data(), linear.data() + 3);
-  w.insert(w.end(), angular.data(), angular.data() + 3);
-  return w;
+std::vector<Tensor> FitProblem::leaves(const FitCandidate& c, int stage) const {
+  std::vector<Tensor> result{c.u.clone().requires_grad_()};
+  if (with_velocity(stage)) result.push_back(c.motion.clone().requires_grad_());
+  return result;
 }
 
-FitCandidate FitProblem::unpack(int start, const std::vector<double>& variables, int stage) const {
-  FitCandidate c = candidate(start, variables);
-  if (!with_velocity(stage)) return c;
-  const double* extra = variables.data() + variables_.size();
-  c.u.resize(variables_.size());
-  c.motion.linear += kLinearUnit * Eigen::Map<const Eigen::Vector3d>(extra);
-  c.motion.angular += kAngularUnit * Eigen::Map<const Eigen::Vector3d>(extra + 3);
-  return c;
+/// The observed velocity and the change of it: linear + angular × (x − centre).
+Tensor FitProblem::velocities(const Tensor& motion) const {
+  const Tensor linear = kLinearUnit * motion.slice(0, 0, 3);
+  const Tensor angular = kAngularUnit * motion.slice(0, 3, 6);
+  return v0_ + linear + torch::cross(angular.expand_as(arm_), arm_, 1);
+}
+
+FitProblem::Evaluation FitProblem::evaluate(const std::vector<Tensor>& leaves, int stage) const {
+  const torch::AutoGradMode with_gradient(true);
+  for (const Tensor& leaf : leaves) leaf.mutable_grad() = Tensor();
+  try {
+    const ops::RolloutBody body = variables_.body(leaves[0], observation_.particles);
+    const Tensor v0 = leaves.size() > 1 ? velocities(leaves[1]) : v0_;
+    const Tensor mse = objective_->mse(body, v0, frames(stage));
+    const Tensor loss = loss_of(mse, leaves[0]);
+    loss.backward();
+    bool finite = std::isfinite(loss.item<double>());
+    for (const Tensor& leaf : leaves) finite = finite && leaf.grad().isfinite().all().item<bool>();
+    if (finite) return {loss.detach(), mse.item<double>()};
+  } catch (const Error&) {  // the roll-out failed
+  }
+  for (const Tensor& leaf : leaves) leaf.mutable_grad() = Tensor();
+  return {torch::scalar_tensor(kInfinity, torch::kFloat64), kInfinity};
 }
 
 void FitProblem::refuse_starts() const {

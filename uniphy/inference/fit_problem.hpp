@@ -25,27 +25,34 @@ class FitProblem {
   std::ptrdiff_t frames(int stage) const;  ///< that the stage compares
   double horizon_time(int stage) const;    ///< s
 
-  /// A candidate at `u` that comes from row `start`, with the observed initial velocity; its loss
-  /// is not known yet.
-  FitCandidate candidate(int start, const std::vector<double>& u) const;
+  /// A candidate at the start, with the observed initial velocity; its loss is not known yet.
+  FitCandidate candidate(int start) const;
+  /// The initial velocity of a candidate.
+  RigidMotion motion(const FitCandidate& c) const;
 
-  /// mse/size² and the prior.
-  double loss(double mse, const std::vector<double>& u) const;
   /// The error (m²) of every frame up to `frames`, infinite from where the roll-out fails.
   std::vector<double> frame_mse(const FitCandidate& c, std::ptrdiff_t frames) const;
-  /// Fills in the loss and mse at the stage's horizon; returns the gradient by the variables of
-  /// pack(), empty where the loss is not finite.
-  std::vector<double> evaluate(FitCandidate& c, int stage) const;
+  /// mse/size² and the prior, at the candidate's u.
+  double loss(double mse, const torch::Tensor& u) const;
 
-  /// The variables of a stage: u, and the initial velocity where it is fitted too.
-  std::vector<double> pack(const FitCandidate& c, int stage) const;
-  FitCandidate unpack(int start, const std::vector<double>& variables, int stage) const;
+  /// Leaves to be moved in a stage, copies of the candidate's: u [size], and the change of the
+  /// initial velocity [6] where it is fitted too, in units of 0.1 m/s and 0.5 rad/s.
+  std::vector<torch::Tensor> leaves(const FitCandidate& c, int stage) const;
+  bool with_velocity(int stage) const;
+
+  struct Evaluation {
+    torch::Tensor loss;  ///< [], infinite where the roll-out or its gradient failed
+    double mse;          ///< m², likewise
+  };
+  /// The loss at the leaves over the stage's horizon; its gradient is left in their .grad(),
+  /// undefined where the loss is not finite.
+  Evaluation evaluate(const std::vector<torch::Tensor>& leaves, int stage) const;
 
   [[noreturn]] void refuse_starts() const;  ///< says why the first one cannot be simulated
 
  private:
-  bool with_velocity(int stage) const;
-  double prior_weight() const;
+  torch::Tensor loss_of(const torch::Tensor& mse, const torch::Tensor& u) const;
+  torch::Tensor velocities(const torch::Tensor& motion) const;
 
   const Observation& observation_;
   const std::string& name_;
@@ -56,6 +63,7 @@ class FitProblem {
   double size_;
   RigidMotion motion_;
   std::ptrdiff_t contact_;
+  torch::Tensor v0_, arm_;  ///< [particles, 3] observed velocity, position from the centre
   std::unique_ptr<const MotionObjective> objective_;
 };
 

@@ -1,79 +1,64 @@
 #include "uniphy/inference/fit_variables.hpp"
 
+#include <torch/torch.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
 #include "ops/kernels/base/error.hpp"
+#include "ops/kernels/laws/law_parameters.hpp"
 #include "uniphy/data/material_ranges.hpp"
 #include "uniphy/geometry/random.hpp"
 
 namespace uniphy {
 namespace {
 
+torch::Tensor to_tensor(const std::vector<double>& numbers) {
+  return torch::tensor(numbers, torch::kFloat64);
+}
+
 class LatentFitVariables : public FitVariables {
  public:
   explicit LatentFitVariables(const ModelFile& model)
       : weights_(std::make_shared<kernels::LearnedLawWeights>(model.weights)),
-        materials_(model.materials),
-        size_(model.weights.latent_size),
-        mean_(size_, 0.0),
-        spread_(size_, 1.0) {
+        networks_(ops::to_networks(model.weights, torch::kFloat64)),
+        materials_(model.materials) {
     const auto codes = static_cast<int>(model.codes());
     if (codes == 0) throw Error("model: expected latent codes to start from, found none");
-    for (int k = 0; k < size_; ++k) {
-      double sum = 0, squares = 0;
-      for (int i = 0; i < codes; ++i) sum += model.latents[i * size_ + k];
-      mean_[k] = sum / codes;
-      for (int i = 0; i < codes; ++i)
-        squares += std::pow(model.latents[i * size_ + k] - mean_[k], 2);
-      if (squares > 0) spread_[k] = std::sqrt(squares / codes);
-    }
+    const torch::Tensor z = to_tensor(model.latents).view({codes, size()});
+    mean_ = z.mean(0);
+    const torch::Tensor spread = z.std(0, /*unbiased=*/false);
+    spread_ = torch::where(spread > 0, spread, torch::ones_like(spread));
+    const torch::Tensor u = ((z - mean_) / spread_).contiguous();
     for (int i = 0; i < codes; ++i) {
-      std::vector<double> u = model.code(i);
-      for (int k = 0; k < size_; ++k) u[k] = (u[k] - mean_[k]) / spread_[k];
-      starts_.push_back(std::move(u));
+      const double* row = u.data_ptr<double>() + i * size();
+      starts_.emplace_back(row, row + size());
     }
   }
 
-  int size() const override { return size_; }
+  int size() const override { return weights_->latent_size; }
 
-  kernels::LawDescription law(const std::vector<double>& u) const override {
-    kernels::LawDescription description;
-    description.id = kernels::LawId::learned;
-    description.weights = weights_;
-    description.z.resize(size_);
-    for (int k = 0; k < size_; ++k) description.z[k] = mean_[k] + spread_[k] * u[k];
-    return description;
+  ops::RolloutBody body(const torch::Tensor& u, std::ptrdiff_t particles) const override {
+    kernels::LawDescription law;
+    law.id = kernels::LawId::learned;
+    law.weights = weights_;
+    return {0, particles, law, code(u), networks_};
   }
 
-  std::vector<double> gradient(const std::vector<double>&,
-                               const std::vector<double>& by_parameters) const override {
-    std::vector<double> g(size_);
-    for (int k = 0; k < size_; ++k) g[k] = spread_[k] * by_parameters[k];
-    return g;
-  }
-
-  double prior(const std::vector<double>& u, double weight,
-               std::vector<double>* gradient) const override {
-    double sum = 0;
-    for (int k = 0; k < size_; ++k) {
-      const double z = mean_[k] + spread_[k] * u[k];
-      sum += z * z;
-      if (gradient != nullptr) (*gradient)[k] += weight * 2 * z * spread_[k];
-    }
-    return sum;
-  }
+  torch::Tensor prior(const torch::Tensor& u) const override { return code(u).square().sum(); }
 
   int starts() const override { return static_cast<int>(starts_.size()); }
   std::vector<double> start(int i) const override { return starts_[i]; }
   std::string label(int i) const override { return materials_[i]; }
 
  private:
+  torch::Tensor code(const torch::Tensor& u) const { return mean_ + spread_ * u; }
+
   std::shared_ptr<const kernels::LearnedLawWeights> weights_;
+  ops::LearnedNetworks networks_;
   std::vector<std::string> materials_;
-  int size_;
-  std::vector<double> mean_, spread_;
+  torch::Tensor mean_, spread_;  // [latent size]
   std::vector<std::vector<double>> starts_;
 };
 
@@ -81,47 +66,35 @@ class AnalyticFitVariables : public FitVariables {
  public:
   AnalyticFitVariables(kernels::LawId id, const std::vector<std::array<double, 2>>& ranges,
                        int starts, std::uint64_t seed)
-      : id_(id), parameters_(kernels::law_parameters(id)) {
-    if (ranges.size() != parameters_.size()) {
+      : id_(id), size_(static_cast<int>(kernels::law_parameters(id).size())) {
+    if (static_cast<int>(ranges.size()) != size_) {
       throw Error(std::string("law ") + kernels::law_name(id) + ": expected " +
-                  std::to_string(parameters_.size()) + " ranges, found " +
-                  std::to_string(ranges.size()));
+                  std::to_string(size_) + " ranges, found " + std::to_string(ranges.size()));
     }
+    std::vector<double> middle, half;
     for (const auto& range : ranges) {
-      middle_.push_back(0.5 * (std::log(range[0]) + std::log(range[1])));
-      half_.push_back(std::max(0.5 * (std::log(range[1]) - std::log(range[0])), 1e-3));
+      middle.push_back(0.5 * (std::log(range[0]) + std::log(range[1])));
+      half.push_back(std::max(0.5 * (std::log(range[1]) - std::log(range[0])), 1e-3));
     }
+    middle_ = to_tensor(middle);
+    half_ = to_tensor(half);
     UniformRandom random(seed);
     for (int i = 0; i < starts; ++i) {
       std::vector<double> u;
-      for (std::size_t k = 0; k < parameters_.size(); ++k) u.push_back(random.between(-1, 1));
+      for (int k = 0; k < size_; ++k) u.push_back(random.between(-1, 1));
       starts_.push_back(std::move(u));
     }
   }
 
-  int size() const override { return static_cast<int>(parameters_.size()); }
+  int size() const override { return size_; }
 
-  kernels::LawDescription law(const std::vector<double>& u) const override {
-    kernels::LawDescription description;
-    description.id = id_;
-    for (int k = 0; k < size(); ++k) {
-      description.*parameters_[k].member = std::exp(middle_[k] + half_[k] * u[k]);
-    }
-    return description;
+  ops::RolloutBody body(const torch::Tensor& u, std::ptrdiff_t particles) const override {
+    kernels::LawDescription law;
+    law.id = id_;
+    return {0, particles, law, (middle_ + half_ * u).exp()};
   }
 
-  std::vector<double> gradient(const std::vector<double>& u,
-                               const std::vector<double>& by_parameters) const override {
-    std::vector<double> g(size());
-    for (int k = 0; k < size(); ++k) {
-      g[k] = by_parameters[k] * half_[k] * std::exp(middle_[k] + half_[k] * u[k]);
-    }
-    return g;
-  }
-
-  double prior(const std::vector<double>&, double, std::vector<double>*) const override {
-    return 0;
-  }
+  torch::Tensor prior(const torch::Tensor&) const override { return {}; }
 
   int starts() const override { return static_cast<int>(starts_.size()); }
   std::vector<double> start(int i) const override { return starts_[i]; }
@@ -129,12 +102,21 @@ class AnalyticFitVariables : public FitVariables {
 
  private:
   kernels::LawId id_;
-  const std::vector<kernels::LawParameter>& parameters_;
-  std::vector<double> middle_, half_;
+  int size_;
+  torch::Tensor middle_, half_;  // [size]
   std::vector<std::vector<double>> starts_;
 };
 
 }  // namespace
+
+kernels::LawDescription FitVariables::law(const torch::Tensor& u) const {
+  const ops::RolloutBody at = body(u.detach(), 0);
+  return kernels::with_parameters(at.law, at.parameters.data_ptr<double>());
+}
+
+kernels::LawDescription FitVariables::law(const std::vector<double>& u) const {
+  return law(to_tensor(u));
+}
 
 std::vector<NearestCode> FitVariables::nearest(const std::vector<double>& u, int count) const {
   std::vector<NearestCode> all;

@@ -1,36 +1,41 @@
 #pragma once
 
+#include <torch/types.h>
+
 #include <array>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "ops/kernels/laws/law.hpp"
+#include "ops/rollout/rollout.hpp"
 #include "uniphy/io/latent_file.hpp"
 #include "uniphy/io/model_file.hpp"
 
 namespace uniphy {
 
-/// What a fit looks for: a point u in coordinates of order one, and the law that belongs to it.
+/// What a fit looks for: a point u [size], float64, in coordinates of order one, and the law that
+/// belongs to it. Immutable; calls may run at the same time.
 class FitVariables {
  public:
   virtual ~FitVariables() = default;
   virtual int size() const = 0;
-  virtual kernels::LawDescription law(const std::vector<double>& u) const = 0;
-  /// dL/d(parameters of the law) → dL/du.
-  virtual std::vector<double> gradient(const std::vector<double>& u,
-                                       const std::vector<double>& by_parameters) const = 0;
-  /// ‖z‖² (0 for analytic laws, which have no prior), adding `weight` times its slope to *gradient.
-  virtual double prior(const std::vector<double>& u, double weight,
-                       std::vector<double>* gradient) const = 0;
+  /// The law of u for a differentiable roll-out of `particles`; its parameters are a function of u
+  /// that gradients go through. Every body of one model shares its networks.
+  virtual ops::RolloutBody body(const torch::Tensor& u, std::ptrdiff_t particles) const = 0;
+  /// ‖z‖², a number that gradients go through; undefined for analytic laws, which have no prior.
+  virtual torch::Tensor prior(const torch::Tensor& u) const = 0;
 
   /// Points to start from and the material that each stands for.
   virtual int starts() const = 0;
   virtual std::vector<double> start(int i) const = 0;
   virtual std::string label(int i) const = 0;
 
+  /// The law of u for the kernels and for files.
+  kernels::LawDescription law(const torch::Tensor& u) const;
+  kernels::LawDescription law(const std::vector<double>& u) const;
   /// The known points nearest to u, nearest first.
-  virtual std::vector<NearestCode> nearest(const std::vector<double>& u, int count) const;
+  std::vector<NearestCode> nearest(const std::vector<double>& u, int count) const;
 };
 
 /// The latent code of a trained model: u_k = (z_k − mean_k)/spread_k over the training codes (a

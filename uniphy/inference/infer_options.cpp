@@ -13,6 +13,11 @@ FitOptions read_fit_options(Section& config) {
   options.dtype = config.choice("dtype", std::string("float32"), {"float32", "float64"},
                                 "precision of the roll-outs");
 
+  options.rollout = config.choice(
+      "rollout", std::string("fused"), {"fused", "stepwise"},
+      "fused: one op with an adjoint of its own; stepwise: Algorithm 2 line by line, the same "
+      "numbers for several times the time and memory");
+
   Section velocity = config.section(
       "velocity", "the initial velocity: a rigid motion, from observed positions alone");
   options.velocity_frames = static_cast<int>(
@@ -37,17 +42,18 @@ FitOptions read_fit_options(Section& config) {
   const auto epochs =
       schedule.integers("epochs", std::vector<std::int64_t>{8, 12, 40}, between(1, 100000), "",
                         "roll-outs with gradients of each candidate", sizes);
-  const std::string method = schedule.choice("optimizer", std::string("bfgs"), {"bfgs", "adam"},
-                                             "how candidates are improved");
+  const std::string method =
+      schedule.choice("optimizer", std::string("lbfgs"), {"lbfgs", "adamw"},
+                      "how candidates are improved: torch::optim::LBFGS (strong Wolfe) or AdamW");
   const double rate =
       schedule.real("rate", 0.1, Range{0, 1e3, true}, "",
-                    "length of the first step (adam: of every step, falling along a cosine), in "
+                    "length of the first step (adamw: of every step, falling along a cosine), in "
                     "units of the spread of the training codes");
   options.patience = static_cast<int>(
       schedule.integer("patience", 8, at_least(1), "",
                        "a candidate stops after so many epochs that gain less than 1 %"));
   options.clip = schedule.real("clip", 10, Range{0, 1e6, true}, "",
-                               "adam: longest gradient, in multiples of their mean length");
+                               "adamw: longest gradient, in multiples of their mean length");
   if (!config.describing()) {
     if (candidates.size() != horizon.size() || epochs.size() != horizon.size()) {
       schedule.fail("horizon",

@@ -82,6 +82,16 @@ LatentFile latent_of(const Inference& inference, const FitVariables& variables,
   return file;
 }
 
+std::optional<std::size_t> roll_outs_to_a_hundredth(const FitResult& fit) {
+  const double best_start = *std::min_element(fit.start_mse.begin(), fit.start_mse.end());
+  for (std::size_t i = 0; i < fit.history.size(); ++i) {
+    const FitRecord& r = fit.history[i];
+    const bool all_frames = r.stage == fit.history.back().stage;
+    if (all_frames && r.mse <= 0.01 * best_start) return i + 1;
+  }
+  return {};
+}
+
 void add_metrics(Metrics& metrics, const Inference& inference, const Observation& observation,
                  const FitVariables& variables) {
   const FitResult& fit = inference.fit;
@@ -90,6 +100,9 @@ void add_metrics(Metrics& metrics, const Inference& inference, const Observation
   metrics.set("size", inference.size);
   metrics.set("best_start_mse", inference.best_start);
   metrics.set("roll_outs", static_cast<double>(fit.history.size()));
+  if (const auto count = roll_outs_to_a_hundredth(fit)) {
+    metrics.set("roll_outs_to_a_hundredth", static_cast<double>(*count));
+  }
   metrics.set("starts", static_cast<double>(fit.start_mse.size()));
   metrics.set("starts_failed",
               static_cast<double>(std::count_if(fit.start_mse.begin(), fit.start_mse.end(),

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include "uniphy/inference/fit.hpp"
@@ -28,7 +30,12 @@ Inference infer(const Observation& observation, const std::string& name,
 LatentFile latent_of(const Inference& inference, const FitVariables& variables,
                      const std::string& model, const std::string& config);
 
-/// fit_mse (m²), fit_root_over_size, size, best_start_mse, roll_outs, starts, starts_failed,
+/// Roll-outs with gradients, of all candidates, until the mse over all frames was a hundredth of
+/// the best start's: what optimizers are compared by. Nothing where that was never reached.
+std::optional<std::size_t> roll_outs_to_a_hundredth(const FitResult& fit);
+
+/// fit_mse (m²), fit_root_over_size, size, best_start_mse, roll_outs, roll_outs_to_a_hundredth
+/// (where it was reached), starts, starts_failed,
 /// contact_s, velocity.{x,y,z}, angular_velocity.{x,y,z}, nearest.distance and, of an analytic law,
 /// parameter.NAME.
 void add_metrics(Metrics& metrics, const Inference& inference, const Observation& observation,

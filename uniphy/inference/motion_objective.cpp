@@ -1,12 +1,18 @@
 #include "uniphy/inference/motion_objective.hpp"
 
+#include <omp.h>
+#include <torch/torch.h>
+
 #include <cmath>
 #include <limits>
 
 #include "ops/kernels/base/error.hpp"
+#include "uniphy/inference/stepwise_rollout.hpp"
 
 namespace uniphy {
 namespace {
+
+using torch::Tensor;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
@@ -14,12 +20,38 @@ template <class T>
 class RolloutObjective : public MotionObjective {
  public:
   RolloutObjective(const Observation& observation, const ObservedSteps& steps,
-                   const kernels::GridSettings& grid)
-      : observation_(observation), steps_(steps), grid_(grid) {
+                   const kernels::GridSettings& grid, const std::string& rollout)
+      : observation_(observation),
+        steps_(steps),
+        grid_(grid),
+        rollout_(rollout == "stepwise" ? &stepwise_rollout : &ops::rollout) {
     const std::vector<double> mass = observed_mass(observation);
     mass_.assign(mass.begin(), mass.end());
     volume_.assign(observation.volume.begin(), observation.volume.end());
     start_.assign(observation.x.begin(), observation.x.begin() + 3 * observation.particles);
+    const std::int64_t P = observation.particles;
+    const torch::Dtype dtype = torch::CppTypeToScalarType<T>::value;
+    x0_ = torch::tensor(start_, dtype).view({P, 3});
+    mass_tensor_ = torch::tensor(mass_, dtype);
+    volume_tensor_ = torch::tensor(volume_, dtype);
+    seen_ = torch::tensor(observation.x, torch::kFloat64).view({-1, 3 * P});
+    std::vector<std::int64_t> states;  // among those that the roll-out hands out
+    for (const std::ptrdiff_t step : steps.step) states.push_back(step / steps.stride);
+    states_ = torch::tensor(states);
+  }
+
+  Tensor mse(const ops::RolloutBody& body, const Tensor& v0, std::ptrdiff_t frames) const override {
+    ops::RolloutSettings settings;
+    settings.grid = grid_;
+    settings.steps = steps_.last(frames);
+    settings.every = steps_.stride;
+    Tensor x =
+        rollout_(x0_, v0.to(x0_.dtype()), {}, {}, mass_tensor_, volume_tensor_, {body}, settings).x;
+    if (x.size(0) != frames) x = x.index_select(0, states_.slice(0, 0, frames));
+    const Tensor difference =
+        x.flatten(1).to(torch::kFloat64) - seen_.slice(0, 0, frames);  // [frames, 3 particles]
+    // First within the frames: sums of rows have one order on any number of threads.
+    return difference.square().mean(1).mean();
   }
 
   std::vector<double> frame_mse(const kernels::LawDescription& law, const RigidMotion& motion,
@@ -28,42 +60,11 @@ class RolloutObjective : public MotionObjective {
     std::ptrdiff_t frame = 0;
     try {
       run(law, motion, frames, [&](const std::vector<T>& x) {
-        const double mse = frame_error(x.data(), frame, nullptr);
+        const double mse = frame_error(x, frame);
         if (std::isfinite(mse)) result[frame] = mse;
         ++frame;
       });
     } catch (const Error&) {  // left the grid: the later frames stay infinite
-    }
-    return result;
-  }
-
-  Evaluation evaluate(const kernels::LawDescription& law, const RigidMotion& motion,
-                      std::ptrdiff_t frames) const override {
-    Evaluation result;
-    result.mse = kInfinity;
-    try {
-      const kernels::Rollout<T> rollout = rollout_of(law);
-      const std::ptrdiff_t steps = steps_.last(frames), stride = steps_.stride;
-      const std::size_t row = start_.size();
-      std::vector<T> x(row * kernels::Rollout<T>::frame_count(steps, stride));
-      kernels::RolloutTape<T> tape;
-      rollout.record(initial(motion), steps, stride, x.data(), nullptr, &tape);
-
-      std::vector<T> grad(x.size(), T(0));
-      double mse = 0;
-      for (std::ptrdiff_t f = 0; f < frames; ++f) {
-        const std::size_t at = steps_.step[f] / stride * row;
-        mse += frame_error(&x[at], f, &grad[at]) / static_cast<double>(frames);
-      }
-      // frame_error leaves the differences; d(mean of squares) = 2/N times them.
-      const T scale = T(2.0 / (static_cast<double>(frames) * static_cast<double>(row)));
-      for (T& g : grad) g *= scale;
-      const kernels::RolloutGradient<T> back = rollout.adjoint(tape, grad.data(), nullptr);
-      result.parameters.assign(back.parameters[0].begin(), back.parameters[0].end());
-      const std::vector<double> position(start_.begin(), start_.end());
-      result.motion = motion.gradient(position, {back.state.v.begin(), back.state.v.end()});
-      if (std::isfinite(mse) && finite(result)) result.mse = mse;
-    } catch (const Error&) {
     }
     return result;
   }
@@ -78,29 +79,14 @@ class RolloutObjective : public MotionObjective {
   }
 
  private:
-  static bool finite(const Evaluation& e) {
-    bool good = true;
-    for (const double g : e.parameters) good = good && std::isfinite(g);
-    for (const double g : e.motion) good = good && std::isfinite(g);
-    return good;
-  }
-
-  kernels::Rollout<T> rollout_of(const kernels::LawDescription& law) const {
-    return kernels::Rollout<T>(grid_, {{0, observation_.particles, kernels::make_law<T>(law)}},
-                               mass_, volume_);
-  }
-
-  kernels::ParticleState<T> initial(const RigidMotion& motion) const {
-    const std::vector<double> v =
-        motion.velocities({observation_.x.begin(), observation_.x.begin() + start_.size()});
-    return kernels::ParticleState<T>::undeformed(start_, {v.begin(), v.end()});
-  }
-
   template <class Visit>
   void run(const kernels::LawDescription& law, const RigidMotion& motion, std::ptrdiff_t frames,
            const Visit& visit) const {
-    const kernels::Rollout<T> rollout = rollout_of(law);
-    kernels::ParticleState<T> state = initial(motion);
+    const kernels::Rollout<T> rollout(
+        grid_, {{0, observation_.particles, kernels::make_law<T>(law)}}, mass_, volume_);
+    const std::vector<double> v =
+        motion.velocities({observation_.x.begin(), observation_.x.begin() + start_.size()});
+    auto state = kernels::ParticleState<T>::undeformed(start_, {v.begin(), v.end()});
     std::ptrdiff_t next = 0;
     kernels::RunOptions<T> options;
     options.every = steps_.stride;
@@ -114,34 +100,46 @@ class RolloutObjective : public MotionObjective {
     rollout.run(state, steps_.last(frames), options);
   }
 
-  /// Mean squared error of one frame; the differences go to `difference` unless null.
-  double frame_error(const T* x, std::ptrdiff_t frame, T* difference) const {
+  double frame_error(const std::vector<T>& x, std::ptrdiff_t frame) const {
     const double* seen = observation_.positions(frame);
     double sum = 0;
-    for (std::size_t k = 0; k < start_.size(); ++k) {
+    for (std::size_t k = 0; k < x.size(); ++k) {
       const double d = static_cast<double>(x[k]) - seen[k];
-      if (difference != nullptr) difference[k] = T(d);
       sum += d * d;
     }
-    return sum / static_cast<double>(start_.size());
+    return sum / static_cast<double>(x.size());
   }
 
   const Observation& observation_;
   ObservedSteps steps_;
   kernels::GridSettings grid_;
+  decltype(&ops::rollout) rollout_;
   std::vector<T> mass_, volume_, start_;
+  Tensor x0_, mass_tensor_, volume_tensor_;  // the same, in T
+  Tensor seen_;                              // [frames, 3 particles], float64
+  Tensor states_;                            // [frames]
 };
+
+/// LibTorch chooses the number of OpenMP threads anew when a thread first asks for it. It is asked
+/// here, and the number that --threads chose is put back.
+void keep_thread_count() {
+  const int threads = omp_get_max_threads();
+  at::get_num_threads();
+  omp_set_num_threads(threads);
+}
 
 }  // namespace
 
 std::unique_ptr<const MotionObjective> make_motion_objective(const Observation& observation,
                                                              const ObservedSteps& steps,
                                                              const kernels::GridSettings& grid,
-                                                             const std::string& dtype) {
+                                                             const std::string& dtype,
+                                                             const std::string& rollout) {
+  keep_thread_count();
   if (dtype == "float64") {
-    return std::make_unique<RolloutObjective<double>>(observation, steps, grid);
+    return std::make_unique<RolloutObjective<double>>(observation, steps, grid, rollout);
   }
-  return std::make_unique<RolloutObjective<float>>(observation, steps, grid);
+  return std::make_unique<RolloutObjective<float>>(observation, steps, grid, rollout);
 }
 
 double mean_of_first(const std::vector<double>& frame_mse, std::ptrdiff_t frames) {

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <vector>
 
 namespace uniphy {
@@ -14,9 +13,6 @@ struct RigidMotion {
 
   /// x [particles, 3] → v [particles, 3].
   std::vector<double> velocities(const std::vector<double>& x) const;
-  /// dL/dv [particles, 3] → dL/d(linear, angular).
-  std::array<double, 6> gradient(const std::vector<double>& x,
-                                 const std::vector<double>& grad_v) const;
 };
 
 }  // namespace uniphy

@@ -19,7 +19,7 @@ using ::testing::HasSubstr;
 
 FitOptions one_stage() {
   FitOptions options;
-  options.stages = {{1, 1, 1, "bfgs", 0.1}};
+  options.stages = {{1, 1, 1, "lbfgs", 0.1}};
   return options;
 }
 
@@ -157,6 +157,13 @@ TEST(BadState, WithANumberOutOfPlaceIsRefused) {
   refused([](FitState& s) { s.start_mse.pop_back(); }, "expected one loss a start and stage");
   refused([](FitState& s) { s.candidates.clear(); }, "expected candidates, found none");
   refused([](FitState& s) { s.candidates[0].start = 5; }, "does not fit the model");
+  refused(
+      [](FitState& s) {
+        s.stage = 0;
+        s.steps = 1;
+        s.candidates[0].optimizer = "damaged";
+      },
+      "state.h5: state of the optimizer: ");
 }
 
 TEST(Fingerprint, SeesEverythingThatAFitDependsOn) {
@@ -274,6 +281,7 @@ INSTANTIATE_TEST_SUITE_P(
                   "expected 1 in the last stage, found 0.8"},
         BadConfig{"HorizonOutOfRange", "schedule: {horizon: [0, 0.5, 1]}", "schedule.horizon"},
         BadConfig{"UnknownOptimizer", "schedule: {optimizer: newton}", "schedule.optimizer"},
+        BadConfig{"UnknownRollout", "rollout: fast", "rollout"},
         BadConfig{"UnknownPrecision", "dtype: float16", "dtype"},
         BadConfig{"UnknownLaw", "law: {type: jelly}", "law.type"},
         BadConfig{"RangeUpsideDown", "law: {type: elastic, mu: [2, 1]}", "law.mu"},

@@ -21,7 +21,7 @@ FitHooks quiet() {
   return hooks;
 }
 
-FitOptions schedule(const std::string& dtype = "float32", const std::string& method = "bfgs") {
+FitOptions schedule(const std::string& dtype = "float32", const std::string& method = "lbfgs") {
   FitOptions options;
   options.dtype = dtype;
   options.stages = {{0.3, 4, 5, method, 0.1}, {0.6, 2, 6, method, 0.1}, {1, 1, 20, method, 0.1}};
@@ -49,9 +49,9 @@ TEST(Fit, FindsTheParametersOfAnElasticBody) {
   const auto variables =
       make_analytic_variables(kernels::LawId::elastic, {{1e3, 1e6}, {1e3, 1e6}}, 12, 1);
   const FitResult r = fit_observation(o, "o", *variables, schedule(), quiet());
-  EXPECT_NEAR(r.law.mu, 2e4, 20);
-  EXPECT_NEAR(r.law.lambda, 3e4, 60);
-  EXPECT_LT(r.mse, 1e-10);
+  EXPECT_NEAR(r.law.mu, 2e4, 1);
+  EXPECT_NEAR(r.law.lambda, 3e4, 20);
+  EXPECT_LT(r.mse, 1e-11);
 }
 
 TEST(Fit, FindsAKnownLatentCode) {
@@ -59,21 +59,43 @@ TEST(Fit, FindsAKnownLatentCode) {
   FitOptions options = schedule();
   options.stages.back().epochs = 40;
   const FitResult r = fit_observation(hidden.observation, "o", *hidden.variables, options, quiet());
-  EXPECT_LT(r.mse, 1e-9);
-  EXPECT_LT(r.mse, 1e-3 * *std::min_element(r.start_mse.begin(), r.start_mse.end()));
+  EXPECT_LT(r.mse, 5e-11);
+  EXPECT_LT(r.mse, 1e-4 * *std::min_element(r.start_mse.begin(), r.start_mse.end()));
   const std::vector<double>&found = r.law.z, &true_z = hidden.law.z;
   // What the motion shows: stiffness s/e, yield strain e c₁, ratio of the moduli.
-  EXPECT_NEAR(3 * found[0] - 2 * found[1], 3 * true_z[0] - 2 * true_z[1], 0.02);
+  EXPECT_NEAR(3 * found[0] - 2 * found[1], 3 * true_z[0] - 2 * true_z[1], 5e-3);
   EXPECT_NEAR(std::exp(2 * found[1]) * (1.5 + 2 * found[2]),
-              std::exp(2 * true_z[1]) * (1.5 + 2 * true_z[2]), 0.02);
-  EXPECT_NEAR(found[3], true_z[3], 0.05);
+              std::exp(2 * true_z[1]) * (1.5 + 2 * true_z[2]), 3e-3);
+  EXPECT_NEAR(found[3], true_z[3], 5e-3);
 }
 
-TEST(Fit, AdamImprovesOnEveryStart) {
+TEST(Fit, AdamwImprovesOnEveryStart) {
   const Hidden hidden;
   const FitResult r = fit_observation(hidden.observation, "o", *hidden.variables,
-                                      schedule("float32", "adam"), quiet());
-  EXPECT_LT(r.mse, 0.3 * *std::min_element(r.start_mse.begin(), r.start_mse.end()));
+                                      schedule("float32", "adamw"), quiet());
+  EXPECT_LT(r.mse, 0.15 * *std::min_element(r.start_mse.begin(), r.start_mse.end()));
+}
+
+TEST(Fit, APriorDrawsTheCodeTowardsZero) {
+  const Hidden hidden;
+  FitOptions options = schedule();
+  const auto square = [](const FitResult& r) {
+    double sum = 0;
+    for (const double z : r.law.z) sum += z * z;
+    return sum;
+  };
+  const FitResult free =
+      fit_observation(hidden.observation, "o", *hidden.variables, options, quiet());
+  options.prior = 1;  // far more than any error of the motion, in units of the size
+  const FitResult drawn =
+      fit_observation(hidden.observation, "o", *hidden.variables, options, quiet());
+  EXPECT_GT(square(free), 0.01);
+  EXPECT_LT(square(drawn), 5e-3 * square(free));
+  EXPECT_GT(drawn.mse, 1e6 * free.mse);
+  options.prior_sigma = 1e6;  // so wide that it draws at nothing
+  const FitResult wide =
+      fit_observation(hidden.observation, "o", *hidden.variables, options, quiet());
+  EXPECT_GT(square(wide), 0.8 * square(free));
 }
 
 TEST(Fit, RefinesTheInitialVelocityTogether) {
@@ -88,9 +110,9 @@ TEST(Fit, RefinesTheInitialVelocityTogether) {
   options.stages.back().epochs = 40;
   const FitResult refined = fit_observation(noisy, "o", *hidden.variables, options, quiet());
   const RigidMotion truth = testing::ObservedScene{}.motion;
-  EXPECT_LT(refined.mse, plain.mse);
+  EXPECT_LT(refined.mse, 0.3 * plain.mse);
   EXPECT_LT((refined.motion.linear - truth.linear).norm(),
-            (plain.motion.linear - truth.linear).norm());
+            0.5 * (plain.motion.linear - truth.linear).norm());
 }
 
 TEST(Fit, OneAndTwoThreadsGiveTheSameBits) {
@@ -115,11 +137,19 @@ TEST(Fit, OneAndTwoThreadsGiveTheSameBits) {
   }
 }
 
-class StoppedAfter : public ::testing::TestWithParam<int> {};
+struct Stop {
+  const char* optimizer;
+  int records;
+};
+std::ostream& operator<<(std::ostream& out, const Stop& s) {
+  return out << s.optimizer << s.records;
+}
+
+class StoppedAfter : public ::testing::TestWithParam<Stop> {};
 
 TEST_P(StoppedAfter, GoesOnToTheSameBits) {
   const Hidden hidden;
-  FitOptions options = schedule();
+  FitOptions options = schedule("float32", GetParam().optimizer);
   options.stages.back().epochs = 5;
   const FitResult whole =
       fit_observation(hidden.observation, "o", *hidden.variables, options, quiet());
@@ -129,12 +159,13 @@ TEST_P(StoppedAfter, GoesOnToTheSameBits) {
   hooks.state_file = scratch.file("state.h5");
   hooks.fingerprint = fit_fingerprint(hidden.observation, *hidden.variables, "");
   hooks.save_seconds = 0;
-  struct Stop {};
+  struct Stopped {};
   int records = 0;
   hooks.on_record = [&](const FitRecord&) {
-    if (++records == GetParam()) throw Stop();
+    if (++records == GetParam().records) throw Stopped();
   };
-  EXPECT_THROW(fit_observation(hidden.observation, "o", *hidden.variables, options, hooks), Stop);
+  EXPECT_THROW(fit_observation(hidden.observation, "o", *hidden.variables, options, hooks),
+               Stopped);
   int more = 0;
   hooks.on_record = [&](const FitRecord&) { ++more; };
   const FitResult resumed =
@@ -150,7 +181,9 @@ TEST_P(StoppedAfter, GoesOnToTheSameBits) {
 }
 
 // In the first stage, between its evaluations; in the second; in the last.
-INSTANTIATE_TEST_SUITE_P(Records, StoppedAfter, ::testing::Values(6, 10, 24, 34));
+INSTANTIATE_TEST_SUITE_P(Records, StoppedAfter,
+                         ::testing::Values(Stop{"lbfgs", 15}, Stop{"lbfgs", 24}, Stop{"lbfgs", 34},
+                                           Stop{"adamw", 6}, Stop{"adamw", 24}, Stop{"adamw", 34}));
 
 TEST(Fit, ACandidateThatFailsIsDroppedAndTheOthersGoOn) {
   Hidden hidden;
@@ -159,7 +192,7 @@ TEST(Fit, ACandidateThatFailsIsDroppedAndTheOthersGoOn) {
   const auto variables = make_latent_variables(hidden.model);
   const FitResult r = fit_observation(hidden.observation, "o", *variables, schedule(), quiet());
   EXPECT_TRUE(std::isinf(r.start_mse[0]));
-  EXPECT_LT(r.mse, 1e-6);
+  EXPECT_LT(r.mse, 5e-10);
   EXPECT_NE(r.start, 0);
 }
 
@@ -210,6 +243,14 @@ TEST(Fit, PicturesAndMetricsOfAResult) {
   Metrics metrics;
   add_metrics(metrics, inference, hidden.observation, *hidden.variables);
   for (const auto& [name, value] : metrics.entries()) EXPECT_TRUE(std::isfinite(value)) << name;
+  const auto count = roll_outs_to_a_hundredth(inference.fit);
+  EXPECT_EQ(count.has_value(), metrics.find("roll_outs_to_a_hundredth").has_value());
+  FitResult made;
+  made.start_mse = {2e-4, 1e-4};
+  made.history = {{0, 1, 0, 0.1, 1e-9}, {1, 1, 0, 0.2, 2e-6}, {1, 1, 1, 0.2, 1e-6}};
+  EXPECT_EQ(roll_outs_to_a_hundredth(made), 3u);  // the first stage does not see all frames
+  made.history.pop_back();
+  EXPECT_FALSE(roll_outs_to_a_hundredth(made).has_value());
   EXPECT_EQ(*metrics.find("roll_outs"), static_cast<double>(inference.fit.history.size()));
   const Chart chart = loss_chart(inference.fit, *hidden.variables, "loss");
   std::size_t points = 0;

@@ -70,7 +70,7 @@ TEST(Identify, AnInterruptedRunGoesOnWithTheCasesThatAreDone) {
   }
 }
 
-TEST(Identify, TakesUpNothingOfAnotherConfigurationOrModel) {
+TEST(Identify, ResumesNothingOfAnotherConfigurationOrModel) {
   const testing::Scratch scratch;
   CaseResult done;
   done.row.material = "elastic";

@@ -1,0 +1,77 @@
+// Algorithm 2 of UniPhy's supplementary material, lines 4 to 16, in the order of its lines. Two of
+// them wait: the transfer to the grid (line 5) takes the stress, so it follows lines 6 to 12.
+
+#include "uniphy/inference/stepwise_rollout.hpp"
+
+#include <torch/torch.h>
+
+#include <string>
+
+#include "ops/kernels/base/error.hpp"
+#include "ops/laws/kirchhoff_stress.hpp"
+#include "ops/laws/return_mapping.hpp"
+#include "ops/learned/learned_law.hpp"
+#include "ops/mpm/g2p.hpp"
+#include "ops/mpm/grid_update.hpp"
+#include "ops/mpm/p2g.hpp"
+
+namespace uniphy {
+namespace {
+
+using torch::Tensor;
+
+ops::LawOutput law_of(const ops::RolloutBody& body, const Tensor& F, const Tensor& C, double dt) {
+  if (body.law.id != kernels::LawId::learned && !body.networks.defined()) {
+    const ops::Material material = body.parameters.defined()
+                                       ? ops::material_of("rollout", body.law.id, body.parameters)
+                                       : ops::material_of(body.law);
+    const Tensor F_proj = ops::return_mapping(body.law.id, F, material, dt);
+    return {F_proj, ops::kirchhoff_stress(body.law.id, F_proj, C, material)};
+  }
+  const Tensor z =
+      (body.parameters.defined() ? body.parameters : torch::tensor(body.law.z, torch::kFloat64))
+          .to(F.dtype());
+  const auto law = [&](const auto& networks) -> ops::LawOutput {
+    const Tensor F_proj = ops::learned_project(networks, F, z);  // lines 7-9: SVD, Δ = g(F), F + Δ
+    return {F_proj, ops::learned_stress(networks, F_proj, C, z)};  // lines 10-12: SVD, R, f, Ŝ
+  };
+  return body.networks.defined() ? law(body.networks) : law(body.law.weights);
+}
+
+}  // namespace
+
+ops::RolloutFrames stepwise_rollout(const Tensor& x0, const Tensor& v0, const Tensor& C0,
+                                    const Tensor& F0, const Tensor& mass, const Tensor& volume,
+                                    const std::vector<ops::RolloutBody>& bodies,
+                                    const ops::RolloutSettings& settings) {
+  const kernels::GridSettings& grid = settings.grid;
+  Tensor x = x0, v = v0;
+  Tensor C = C0.defined() ? C0 : torch::zeros({x.size(0), 3, 3}, x.options());
+  Tensor F = F0.defined() ? F0 : torch::eye(3, x.options()).repeat({x.size(0), 1, 1});
+  std::vector<Tensor> frames_x{x}, frames_v{v};
+  for (std::ptrdiff_t step = 0; step < settings.steps; ++step) try {  // line 4
+      F = F + grid.dt * torch::bmm(C, F);                             // line 6
+      std::vector<Tensor> F_proj, tau;
+      for (const ops::RolloutBody& body : bodies) {  // lines 7 to 12
+        const auto own = [&body](const Tensor& t) { return t.slice(0, body.begin, body.end); };
+        const ops::LawOutput law = law_of(body, own(F), own(C), grid.dt);
+        F_proj.push_back(law.F_proj);
+        tau.push_back(law.tau);
+      }
+      F = torch::cat(F_proj);
+      const Tensor nodes = ops::p2g(x, v, C, torch::cat(tau), mass, volume, grid);  // line 5
+      const Tensor velocity = ops::grid_update(nodes, grid);                        // line 13
+      const ops::G2p particles = ops::g2p(x, velocity, grid);                       // line 14
+      x = particles.x;                                                              // line 15
+      v = particles.v;
+      C = particles.C;
+      if ((step + 1) % settings.every != 0) continue;
+      frames_x.push_back(x);
+      frames_v.push_back(v);
+    } catch (const Error& error) {
+      throw Error("rollout: step " + std::to_string(step) + ": " + error.what());
+    }
+  return {torch::stack(frames_x), settings.velocities ? torch::stack(frames_v) : Tensor()};
+}
+
+}  // namespace uniphy
