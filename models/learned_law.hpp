@@ -3,10 +3,9 @@
 #include <torch/nn.h>
 
 #include <cstdint>
-#include <vector>
 
 #include "ops/kernels/learned/learned_law_weights.hpp"
-#include "ops/reference/learned_law.hpp"
+#include "ops/learned/learned_law.hpp"
 
 namespace uniphy::models {
 
@@ -15,54 +14,61 @@ struct LearnedLawOptions {
   kernels::LawForm form = kernels::LawForm::isotropic;
   kernels::Activation activation = kernels::Activation::silu;
   std::int64_t latent_size = 8;
-  std::vector<std::int64_t> projection_hidden = {32, 32, 32};  ///< widths; may be empty
-  std::vector<std::int64_t> stress_hidden = {32, 32, 32};
-  std::uint64_t seed = 0;
-  torch::Dtype dtype = torch::kFloat32;
+  std::int64_t hidden_layers = 3;  ///< of each network
+  std::int64_t width = 32;         ///< of each hidden layer
+  // Isotropic form: whether the caps and the moduli answer to the state, or to z alone.
+  bool state_caps = false;
+  bool state_moduli = false;
 };
 
-/// The learned law as a torch module: its parameters are the weights and biases of both networks
-/// ("projection_weight_0", ...), differentiable like z, F and C. Gradients are finite everywhere;
-/// in the isotropic form they are exact at equal singular values too. The networks run through the
-/// fused op (ops/mlp/mlp.hpp). For a fixed model with one latent ops/learned/learned_law.hpp is
-/// much faster.
+class LearnedLaw;
+
+/// The learned law as a torch module: what Algorithm 1 trains, Algorithm 2 differentiates and an
+/// export writes. Its parameters are two flat tensors, "projection" and "stress", each with the
+/// weights and biases of one network (ops::FlatLayers): the cost of an optimizer is by the tensor.
+/// The formulas: ops/kernels/learned/isotropic_law.hpp and published_law.hpp.
 ///
-///   LearnedLaw law(options);
+///   LearnedLaw law(options, generator);
 ///   Tensor F_proj = law->project(F, z), tau = law->stress(F_proj, C, z);
 class LearnedLawImpl : public torch::nn::Module {
  public:
-  /// Hidden layers are drawn from a normal distribution of variance 2/in (He et al. 2015), the last
-  /// ones a tenth of that, so that a new law is soft; biases are 0 but for the caps of the
-  /// isotropic form, which start at a few strain scales. Throws Error for a size that is not
-  /// positive.
-  explicit LearnedLawImpl(const LearnedLawOptions& options);
+  /// Draws float32 weights from the generator: hidden layers that keep the variance of their
+  /// input, and a small last layer. Throws Error naming the option that is out of its range.
+  LearnedLawImpl(const LearnedLawOptions& options, torch::Generator& generator);
   /// Throws Error where the weights do not fit (LearnedLawWeights::check).
   explicit LearnedLawImpl(const kernels::LearnedLawWeights& weights,
                           torch::Dtype dtype = torch::kFloat32);
 
   /// The numbers without torch, for the kernels and for model files.
-  kernels::LearnedLawWeights weights() const;
+  kernels::LearnedLawWeights weights() const { return ops::to_weights(networks_); }
+  /// The parameters as the ops take them, differentiable; they share their numbers.
+  const ops::LearnedNetworks& networks() const { return networks_; }
+  /// A law of the same numbers, shared, that asks for no gradient: a fit of z alone need not pay
+  /// for those of the weights.
+  LearnedLaw frozen() const;
 
-  /// F, F_proj, C [P, 3, 3] (1, 1, 1/s), z [Z] or [P, Z] → [P, 3, 3] (1, Pa). Throws Error naming
-  /// the argument whose shape or type differs from what the law takes.
+  /// F, F_proj, C [P, 3, 3] (1, 1, 1/s), z [Z] → [P, 3, 3] (1, Pa), through the ops of
+  /// ops/learned/learned_law.hpp. evaluate is both in one pass.
   torch::Tensor project(const torch::Tensor& F, const torch::Tensor& z) const;
   torch::Tensor stress(const torch::Tensor& F_proj, const torch::Tensor& C,
                        const torch::Tensor& z) const;
+  ops::LawOutput evaluate(const torch::Tensor& F_trial, const torch::Tensor& C,
+                          const torch::Tensor& z) const;
 
-  /// The tensors behind the parameters, for the step-by-step functions of
-  /// ops/reference/learned_law.hpp.
-  const ops::reference::LearnedLawTensors& tensors() const { return tensors_; }
-  kernels::LawForm form() const { return tensors_.form; }
-  kernels::Activation activation() const { return tensors_.activation; }
-  std::int64_t latent_size() const { return latent_size_; }
+  kernels::LawForm form() const { return networks_.form; }
+  kernels::Activation activation() const { return networks_.activation; }
+  std::int64_t latent_size() const { return networks_.latent_size; }
+  /// Whether the caps and the moduli answer to the state: not where the first layer began with a
+  /// weight of 0 for each of its features.
+  bool state_caps() const { return state_caps_; }
+  bool state_moduli() const { return state_moduli_; }
   std::int64_t parameter_count() const;
 
  private:
-  void adopt(const ops::reference::LearnedLawTensors& initial);
-  void check(const char* name, const torch::Tensor& F, const torch::Tensor& z) const;
+  LearnedLawImpl(ops::LearnedNetworks networks, bool requires_grad);
 
-  std::int64_t latent_size_;
-  ops::reference::LearnedLawTensors tensors_;
+  ops::LearnedNetworks networks_;
+  bool state_caps_, state_moduli_;
 };
 TORCH_MODULE(LearnedLaw);
 

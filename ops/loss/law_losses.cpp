@@ -6,12 +6,10 @@
 #include <string>
 
 #include "ops/base/once_differentiable.hpp"
-#include "ops/base/plain_tensors.hpp"
 #include "ops/base/planes.hpp"
 #include "ops/base/tensor_check.hpp"
 #include "ops/kernels/base/error.hpp"
 #include "ops/kernels/learned/learned_law_weights.hpp"
-#include "ops/reference/law_losses.hpp"
 
 namespace uniphy::ops {
 namespace {
@@ -232,7 +230,6 @@ IsotropicFeatures isotropic_features(const IsotropicBatch& batch, const Tensor& 
   Arguments a;
   a.columns = batch.columns, a.rows = batch.rows, a.z = z;
   check_batch("isotropic_features", a);
-  if (PlainTensors::asked_for()) return reference::isotropic_features(batch, z);
   const variable_list r = IsotropicFeaturesFunction::apply(a.z, a.columns, a.rows);
   return {r[0], r[1]};
 }
@@ -249,7 +246,6 @@ LawLosses law_losses(const IsotropicBatch& batch, const Tensor& scales, const Te
   a.caps_rest = checked(kOp, "caps_rest", answers.caps_rest, type, {a.trajectories(), 1, 4});
   a.moduli = checked_answers("moduli", answers.moduli, a, 8);
   a.moduli_rest = checked(kOp, "moduli_rest", answers.moduli_rest, type, {a.trajectories(), 1, 8});
-  if (PlainTensors::asked_for()) return reference::law_losses(batch, scales, z, answers, measure);
   const variable_list r =
       LawLossesFunction::apply(a.z, a.caps, a.caps_rest, a.moduli, a.moduli_rest, a.columns, a.rows,
                                a.scales, measure.floor, measure.delta);

@@ -4,7 +4,6 @@
 #include <sstream>
 
 #include "ops/base/once_differentiable.hpp"
-#include "ops/base/plain_tensors.hpp"
 #include "ops/base/planes.hpp"
 #include "ops/base/tensor_check.hpp"
 #include "ops/kernels/base/error.hpp"
@@ -243,18 +242,6 @@ torch::Tensor beside(const torch::Tensor& features, const torch::Tensor& z) {
   return torch::cat({features, every}, 2);
 }
 
-torch::Tensor activate(const torch::Tensor& x, kernels::Activation activation) {
-  switch (activation) {
-    case kernels::Activation::gelu:
-      return torch::gelu(x);
-    case kernels::Activation::silu:
-      return torch::silu(x);
-    case kernels::Activation::squareplus:
-      break;
-  }
-  return 0.5 * (x + torch::sqrt(x * x + 4.0)) - 1.0;
-}
-
 }  // namespace
 
 std::vector<LinearLayer> layers_of(const FlatLayers& flat) {
@@ -288,7 +275,6 @@ FlatLayers flatten(const std::vector<LinearLayer>& layers) {
 
 torch::Tensor mlp(const torch::Tensor& x, const std::vector<LinearLayer>& layers,
                   kernels::Activation activation) {
-  if (PlainTensors::asked_for()) return mlp_reference(x, layers, activation);
   check(x, layers);
   return apply(x.unsqueeze(0), torch::empty({1, 0}, x.options()), flatten(layers), activation)
       .squeeze(0);
@@ -299,30 +285,16 @@ torch::Tensor mlp(const torch::Tensor& features, const torch::Tensor& z, const F
   check(features, z, layers);
   const std::int64_t n = features.size(0), m = features.size(1), out = layers.widths.back();
   // A tile belongs to one code: with few samples each, most of it would be empty.
-  if (!PlainTensors::asked_for() && m >= kTile / 2) return apply(features, z, layers, activation);
+  if (m >= kTile / 2) return apply(features, z, layers, activation);
   const torch::Tensor x = beside(features, z).flatten(0, 1);
-  const torch::Tensor y =
-      PlainTensors::asked_for()
-          ? mlp_reference(x, layers_of(layers), activation)
-          : apply(x.unsqueeze(0), torch::empty({1, 0}, x.options()), layers, activation);
-  return y.view({n, m, out});
+  const torch::Tensor none = torch::empty({1, 0}, x.options());
+  return apply(x.unsqueeze(0), none, layers, activation).view({n, m, out});
 }
 
 torch::Tensor mlp(const torch::Tensor& features, const torch::Tensor& z,
                   const std::vector<LinearLayer>& layers, kernels::Activation activation) {
   check(features, z, layers);
   return mlp(features, z, flatten(layers), activation);
-}
-
-torch::Tensor mlp_reference(const torch::Tensor& x, const std::vector<LinearLayer>& layers,
-                            kernels::Activation activation) {
-  check(x, layers);
-  torch::Tensor y = x;
-  for (std::size_t k = 0; k < layers.size(); ++k) {
-    y = torch::linear(y, layers[k].weight, layers[k].bias);
-    if (k + 1 < layers.size()) y = activate(y, activation);
-  }
-  return y;
 }
 
 }  // namespace uniphy::ops

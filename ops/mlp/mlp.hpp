@@ -44,8 +44,4 @@ torch::Tensor mlp(const torch::Tensor& features, const torch::Tensor& z,
 torch::Tensor mlp(const torch::Tensor& features, const torch::Tensor& z, const FlatLayers& layers,
                   kernels::Activation activation);
 
-/// The first of these in plain tensor operations.
-torch::Tensor mlp_reference(const torch::Tensor& x, const std::vector<LinearLayer>& layers,
-                            kernels::Activation activation);
-
 }  // namespace uniphy::ops

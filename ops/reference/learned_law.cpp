@@ -5,32 +5,28 @@
 #include <limits>
 
 #include "ops/reference/isotropic_tensors.hpp"
+#include "ops/reference/mlp.hpp"
 
 namespace uniphy::ops::reference {
 
-using kernels::Activation;
 using kernels::LawForm;
 using torch::Tensor;
 
 namespace {
 
-Tensor activate(Activation activation, const Tensor& x) {
-  switch (activation) {
-    case Activation::gelu:
-      return torch::gelu(x);
-    case Activation::silu:
-      return torch::silu(x);
-    case Activation::squareplus:
-      break;
-  }
-  return 0.5 * (x + (x * x + 4).sqrt()) - 1;
+/// features [P, n] and z [Z] or [P, Z] → [P, out].
+Tensor network(const LearnedNetworks& law, const FlatLayers& layers, const Tensor& features,
+               const Tensor& z) {
+  if (z.dim() == 1)
+    return reference::mlp(features.unsqueeze(0), z.unsqueeze(0), layers, law.activation).squeeze(0);
+  return reference::mlp(features.unsqueeze(1), z, layers, law.activation).squeeze(1);
 }
 
 /// The answer at F = I, C = 0, where every isotropic feature is 0: [1 or P, out].
-Tensor at_rest(const LearnedLawTensors& law, const MlpTensors& net, const Tensor& z) {
-  const auto n = net.weight[0].size(1) - z.size(-1);
-  return law.mlp(net, law.activation, torch::zeros({z.dim() == 2 ? z.size(0) : 1, n}, z.options()),
-                 z);
+Tensor at_rest(const LearnedNetworks& law, const FlatLayers& layers, const Tensor& z) {
+  const std::int64_t particles = z.dim() == 2 ? z.size(0) : 1;
+  const std::int64_t features = layers.widths.front() - z.size(-1);
+  return network(law, layers, torch::zeros({particles, features}, z.options()), z);
 }
 
 Tensor trace_of(const Tensor& m) { return torch::diagonal(m, 0, 1, 2).sum(-1); }  // [P]
@@ -85,7 +81,7 @@ Invariants invariants(const Tensor& H, const Tensor& e) {
   return v;
 }
 
-Tensor isotropic_project(const LearnedLawTensors& law, const Tensor& F, const Tensor& z) {
+Tensor isotropic_project(const LearnedNetworks& law, const Tensor& F, const Tensor& z) {
   const Tensor H = hencky_tensor(F);
   const Tensor e = strain_scale(z);
   const IsotropicCaps caps = isotropic_caps(law, H, z);
@@ -111,14 +107,14 @@ Tensor isotropic_project(const LearnedLawTensors& law, const Tensor& F, const Te
 
 constexpr double kPublishedFloor = 1e-6;
 
-Tensor published_project(const LearnedLawTensors& law, const Tensor& F, const Tensor& z) {
+Tensor published_project(const LearnedNetworks& law, const Tensor& F, const Tensor& z) {
   const SignedSvd s = signed_svd(F);
   const Tensor features =
       torch::cat({F.flatten(1), s.U.flatten(1), s.sigma, s.V.mT().flatten(1)}, 1);
-  return F + law.mlp(law.projection, law.activation, features, z).reshape(F.sizes());
+  return F + network(law, law.projection, features, z).reshape(F.sizes());
 }
 
-Tensor published_stress(const LearnedLawTensors& law, const Tensor& F, const Tensor& C,
+Tensor published_stress(const LearnedNetworks& law, const Tensor& F, const Tensor& C,
                         const Tensor& z) {
   const SignedSvd s = signed_svd(F);
   const Tensor R = polar_rotation(F, s);
@@ -131,40 +127,11 @@ Tensor published_stress(const LearnedLawTensors& law, const Tensor& F, const Ten
                   J.clamp_min(kPublishedFloor).log().unsqueeze(1), F_max.unsqueeze(1),
                   F_max.log().unsqueeze(1), rate.flatten(1)},
                  1);
-  const Tensor S = law.mlp(law.stress, law.activation, features, z).reshape(F.sizes());
+  const Tensor S = network(law, law.stress, features, z).reshape(F.sizes());
   return at_matrix(stress_scale(z)) * R.matmul(symmetric(S)).matmul(R.mT());
 }
 
 }  // namespace
-
-Tensor plain_mlp(const MlpTensors& net, Activation activation, const Tensor& features,
-                 const Tensor& z) {
-  const auto n = features.size(1);
-  const Tensor first = net.weight[0];
-  Tensor x = torch::matmul(features, first.slice(1, 0, n).t()) +
-             (torch::matmul(z, first.slice(1, n).t()) + net.bias[0]);
-  for (std::size_t k = 1; k < net.weight.size(); ++k)
-    x = torch::linear(activate(activation, x), net.weight[k], net.bias[k]);
-  return x;
-}
-
-LearnedLawTensors to_tensors(const kernels::LearnedLawWeights& weights, torch::Dtype dtype) {
-  const auto tensors = [dtype](const kernels::MlpWeights& from) {
-    MlpTensors to;
-    for (const auto& layer : from.layers) {
-      to.weight.push_back(
-          torch::tensor(layer.weight, torch::kFloat64).reshape({layer.out, layer.in}).to(dtype));
-      to.bias.push_back(torch::tensor(layer.bias, torch::kFloat64).to(dtype));
-    }
-    return to;
-  };
-  LearnedLawTensors law;
-  law.form = weights.form;
-  law.activation = weights.activation;
-  law.projection = tensors(weights.projection);
-  law.stress = tensors(weights.stress);
-  return law;
-}
 
 Tensor stress_scale(const Tensor& z) {
   if (z.size(-1) < 1) return torch::full({}, kernels::kStressScale, z.options());
@@ -176,9 +143,9 @@ Tensor strain_scale(const Tensor& z) {
   return kernels::kStrainScale * torch::exp(kernels::kStrainRate * z.select(-1, 1));
 }
 
-IsotropicCaps isotropic_caps(const LearnedLawTensors& law, const Tensor& H, const Tensor& z) {
+IsotropicCaps isotropic_caps(const LearnedNetworks& law, const Tensor& H, const Tensor& z) {
   const Invariants v = invariants(H, strain_scale(z));
-  const Tensor c = law.mlp(law.projection, law.activation, torch::stack({v.t, v.q, v.cubic}, 1), z);
+  const Tensor c = network(law, law.projection, torch::stack({v.t, v.q, v.cubic}, 1), z);
   const Tensor rest = at_rest(law, law.projection, z).select(1, 1).clamp_max(0);
   const Tensor slope = sinh_of(c.select(1, 2));
   const Tensor mean_square = trace_of(symmetric_exp(2 * H)) / 3;
@@ -190,15 +157,14 @@ IsotropicCaps isotropic_caps(const LearnedLawTensors& law, const Tensor& H, cons
   return caps;
 }
 
-Tensor isotropic_stress(const LearnedLawTensors& law, const Tensor& H, const Tensor& C,
+Tensor isotropic_stress(const LearnedNetworks& law, const Tensor& H, const Tensor& C,
                         const Tensor& z) {
   constexpr double d = kernels::kInvariantSmoothing;
   const Invariants v = invariants(H, strain_scale(z));
   const Tensor D = symmetric(C) * kernels::kTimeScale, D_dev = deviator(D), D_trace = trace_of(D);
   const Tensor n = (contract(D_dev, D_dev) + d * d).sqrt() - d;
   const Tensor x = contract(v.W, D_dev) / (1 + n * v.q);
-  const Tensor f =
-      law.mlp(law.stress, law.activation, torch::stack({v.t, v.q, v.cubic, D_trace, n, x}, 1), z);
+  const Tensor f = network(law, law.stress, torch::stack({v.t, v.q, v.cubic, D_trace, n, x}, 1), z);
   const Tensor rest = at_rest(law, law.stress, z).select(1, 1);
   const auto output = [&f](int k) { return f.select(1, k); };  // k̃, a₀, ã₁, a₂, b̃, n, γ, δ
   const Tensor e = strain_scale(z);
@@ -212,12 +178,12 @@ Tensor isotropic_stress(const LearnedLawTensors& law, const Tensor& H, const Ten
   return at_matrix(stress_scale(z)) * in_units_of_s;
 }
 
-Tensor learned_project(const LearnedLawTensors& law, const Tensor& F, const Tensor& z) {
+Tensor learned_project(const LearnedNetworks& law, const Tensor& F, const Tensor& z) {
   return law.form == LawForm::isotropic ? isotropic_project(law, F, z)
                                         : published_project(law, F, z);
 }
 
-Tensor learned_stress(const LearnedLawTensors& law, const Tensor& F_proj, const Tensor& C,
+Tensor learned_stress(const LearnedNetworks& law, const Tensor& F_proj, const Tensor& C,
                       const Tensor& z) {
   return law.form == LawForm::isotropic ? isotropic_stress(law, hencky_tensor(F_proj), C, z)
                                         : published_stress(law, F_proj, C, z);

@@ -2,50 +2,25 @@
 
 #include <torch/types.h>
 
-#include <vector>
+#include "ops/learned/learned_networks.hpp"
 
-#include "ops/kernels/learned/learned_law_weights.hpp"
-
-// The learned law in plain tensor operations: the reference of ops/learned/learned_law.hpp, and
-// what the torch module of models/ runs, so that autograd reaches the weights. The formulas are
-// those of ops/kernels/learned/isotropic_law.hpp and published_law.hpp.
+// The learned law in plain tensor operations: the reference of ops/learned/learned_law.hpp. The
+// formulas are those of ops/kernels/learned/isotropic_law.hpp and published_law.hpp.
 //
 // F, F_proj, C [P, 3, 3] (dimensionless, dimensionless, 1/s); z [Z] for all particles or [P, Z];
 // tau [P, 3, 3] Pa. All tensors share one dtype, float32 or float64.
 
 namespace uniphy::ops::reference {
 
-/// The tensors of kernels::MlpWeights.
-struct MlpTensors {
-  std::vector<torch::Tensor> weight;  ///< [out, in] a layer
-  std::vector<torch::Tensor> bias;    ///< [out] a layer
-};
-
-/// features [P, n] and z [Z] or [P, Z] → [P, out]; the first layer takes the features, then z.
-torch::Tensor plain_mlp(const MlpTensors& net, kernels::Activation activation,
-                        const torch::Tensor& features, const torch::Tensor& z);
-
-/// The tensors of kernels::LearnedLawWeights.
-struct LearnedLawTensors {
-  kernels::LawForm form = kernels::LawForm::isotropic;
-  kernels::Activation activation = kernels::Activation::gelu;
-  MlpTensors projection;
-  MlpTensors stress;
-  /// What runs the networks; a faster one may take its place.
-  decltype(&plain_mlp) mlp = &plain_mlp;
-};
-
-LearnedLawTensors to_tensors(const kernels::LearnedLawWeights& weights, torch::Dtype dtype);
-
 /// s = 1e4 exp(3 z₀) Pa and e = 0.05 exp(2 z₁), each [] or [P]; constants where z is shorter.
 torch::Tensor stress_scale(const torch::Tensor& z);
 torch::Tensor strain_scale(const torch::Tensor& z);
 
 /// G(F).
-torch::Tensor learned_project(const LearnedLawTensors& law, const torch::Tensor& F,
+torch::Tensor learned_project(const LearnedNetworks& law, const torch::Tensor& F,
                               const torch::Tensor& z);
 /// τ(F_proj, C).
-torch::Tensor learned_stress(const LearnedLawTensors& law, const torch::Tensor& F_proj,
+torch::Tensor learned_stress(const LearnedNetworks& law, const torch::Tensor& F_proj,
                              const torch::Tensor& C, const torch::Tensor& z);
 
 // The isotropic form in steps: everything that does not depend on z, the Hencky
@@ -57,10 +32,10 @@ struct IsotropicCaps {
   torch::Tensor c2;     ///< cap of tr H in units of e, min(c₂(rest), 0) taken off
   torch::Tensor share;  ///< r, of what exceeds the cap of ‖dev H‖ that is taken off
 };
-IsotropicCaps isotropic_caps(const LearnedLawTensors& law, const torch::Tensor& H,
+IsotropicCaps isotropic_caps(const LearnedNetworks& law, const torch::Tensor& H,
                              const torch::Tensor& z);
 /// τ, given H of the projected F.
-torch::Tensor isotropic_stress(const LearnedLawTensors& law, const torch::Tensor& H,
+torch::Tensor isotropic_stress(const LearnedNetworks& law, const torch::Tensor& H,
                                const torch::Tensor& C, const torch::Tensor& z);
 
 }  // namespace uniphy::ops::reference

@@ -32,13 +32,13 @@ struct LawLossInputs {
     torch::manual_seed(3);
     seed = torch::randn({n, kernels::kIsotropicLosses}, torch::kFloat64).to(type);
   }
-  ops::LawLosses errors() const {
-    return ops::law_losses(batch, scales, leaves[0], {leaves[1], leaves[2], leaves[3], leaves[4]},
-                           measure);
+  /// of: the op, or its reference.
+  ops::LawLosses errors(decltype(&ops::law_losses) of = &ops::law_losses) const {
+    return of(batch, scales, leaves[0], {leaves[1], leaves[2], leaves[3], leaves[4]}, measure);
   }
-  std::vector<torch::Tensor> gradients() const {
-    return torch::autograd::grad({(seed * errors().losses).sum()}, leaves, {}, c10::nullopt, false,
-                                 /*allow_unused=*/true);
+  std::vector<torch::Tensor> gradients(decltype(&ops::law_losses) of = &ops::law_losses) const {
+    return torch::autograd::grad({(seed * errors(of).losses).sum()}, leaves, {}, c10::nullopt,
+                                 false, /*allow_unused=*/true);
   }
 };
 

@@ -80,7 +80,7 @@ Measurer::Body plain_steps(const Observation& o, const kernels::LawDescription& 
   const Tensor x = tensor(start).view({-1, 3});
   const Tensor v = tensor(benchmark_motion().velocities(start)).view({-1, 3});
   const Tensor volume = tensor(o.volume), mass = volume * o.density;
-  const auto weights = ops::reference::to_tensors(*law.weights, torch::kFloat32);
+  const auto weights = ops::to_networks(*law.weights, torch::kFloat32);
   const auto code = law.z;
   const kernels::GridSettings grid = observed_grid(o, "bench");
   return [=] {

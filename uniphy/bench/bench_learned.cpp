@@ -91,7 +91,7 @@ void bench_size(const BenchOptions& options, kernels::LawForm form, std::int64_t
   description.weights = random_law(form);
   description.z = random_code(*description.weights);
   const auto& weights = description.weights;
-  const auto plain = ops::reference::to_tensors(*weights, torch::kFloat32);
+  const auto plain = ops::to_networks(*weights, torch::kFloat32);
   torch::manual_seed(3);
   const Tensor F = (torch::eye(3) + 0.1 * torch::randn({n, 3, 3})).requires_grad_();
   const Tensor C = torch::randn({n, 3, 3}).requires_grad_();

@@ -2,16 +2,16 @@
 
 #include <random>
 
-#include "ops/base/plain_tensors.hpp"
+#include "ops/reference/law_losses.hpp"
+#include "ops/reference/mlp.hpp"
 #include "uniphy/bench/subjects.hpp"
 #include "uniphy/data/material_ranges.hpp"
 #include "uniphy/training/batches.hpp"
+#include "uniphy/training/initial_model.hpp"
 #include "uniphy/training/training_step.hpp"
 
 namespace uniphy::bench {
 namespace {
-
-using torch::Tensor;
 
 /// Random states of the five materials, and what their laws answer.
 Dataset make_dataset(std::int64_t trajectories, std::int64_t samples) {
@@ -50,34 +50,32 @@ Dataset make_dataset(std::int64_t trajectories, std::int64_t samples) {
 }
 
 struct Training {
-  Training(const Dataset& data, std::int64_t batch)
-      : objective(law_columns(data, kernels::LawForm::isotropic), kernels::LawForm::isotropic,
-                  {options.error_floor, options.delta}),
-        sampler(data, 1),
-        batch(batch) {
+  Training(const Dataset& data, std::int64_t batch_size)
+      : columns(law_columns(data, kernels::LawForm::isotropic)),
+        sampler(columns.first, 1),
+        batch(batch_size) {
     torch::Generator generator = torch::make_generator<at::CPUGeneratorImpl>(1);
     // Networks that are asked for every sample.
-    options.network.state_caps = options.network.state_moduli = true;
+    options.law.state_caps = options.law.state_moduli = true;
     // A rate at which nothing moves: every step is the same work.
     options.learning_rate = 1e-9;
-    networks = Networks::random(options.network, generator);
-    z = 0.1 * torch::randn({sampler.trajectories(), options.network.latent_size}, generator,
-                           torch::kFloat32);
-    z.requires_grad_();
-    optimizer = std::make_unique<torch::optim::AdamW>(make_optimizer(networks, z, options));
+    model = initial_model(data, columns, options.law, generator);
+    optimizer = std::make_unique<torch::optim::AdamW>(make_optimizer(model, options));
   }
 
-  void step() {
-    training_step(objective, networks, z, sampler.rows(0, batch), ReturnStage::actual, options,
+  Objective objective(const ObjectiveOps& ops = {}) const {
+    return {columns, options.loss.measure(), ops};
+  }
+  void step(const Objective& objective) {
+    training_step(objective, model, sampler.rows(0, batch), ReturnStage::actual, options,
                   *optimizer);
   }
 
+  LawColumns columns;
   TrainingOptions options;
-  Objective objective;
   BatchSampler sampler;
   std::int64_t batch;
-  Networks networks;
-  Tensor z;
+  models::TrainedModel model;
   std::unique_ptr<torch::optim::AdamW> optimizer;
 };
 
@@ -86,12 +84,12 @@ struct Training {
 void bench_train(const BenchOptions& options, int threads, BenchReport& report) {
   const std::int64_t batch = options.train_batch;
   Training training(make_dataset(options.train_trajectories, 2 * batch), batch);
+  const Objective ours = training.objective();
+  const Objective plain = training.objective(
+      {&ops::reference::mlp, &ops::reference::isotropic_features, &ops::reference::law_losses});
   Measurer measurer(threads);
-  measurer.add("step", [&] { training.step(); });
-  measurer.add_baseline("step", [&] {
-    const ops::PlainTensors plain;
-    training.step();
-  });
+  measurer.add("step", [&] { training.step(ours); });
+  measurer.add_baseline("step", [&] { training.step(plain); });
   measurer.run(options.effort);
   const std::int64_t samples = options.train_trajectories * batch;
   report.rows.push_back(

@@ -4,9 +4,6 @@
 
 #include <set>
 
-#include "uniphy/training/heldout_fit.hpp"
-#include "uniphy/training/training_options.hpp"
-
 namespace uniphy {
 namespace {
 
@@ -66,26 +63,17 @@ AblationOptions read_ablation_options(Section& config) {
                    }}},
                  "what is the same for all");
   base = read_training_options(config, base, false);
-  o.fit = read_latent_fit_options(config);
+  o.fit = read_latent_fit_options(config, false);
   read_variants(config, base, o);
   return o;
 }
 
 std::string AblationOptions::settings_of(const AblationVariant& v) const {
-  const TrainingOptions& t = v.training;
-  const NetworkOptions& n = t.network;
   GenerateOptions set = draw;
   set.trajectories = v.trajectories;
-  return fmt::format(
-             "form {}, activation {}, latent {}, layers {}, width {}\n"
-             "seed {}, batch {}, rate {} x {}, decay {}, sigma {}, floor {}, delta {}, clip {}\n"
-             "budget {}\nfit: starts {}, steps {}, rate {}\nheld out {}\n",
-             kernels::form_name(n.form), kernels::activation_name(n.activation), n.latent_size,
-             n.hidden_layers, n.width, t.seed, t.batch_per_trajectory, t.learning_rate,
-             t.latent_rate, t.weight_decay, t.latent_sigma, t.error_floor, t.delta, t.clip,
-             budget_seconds ? fmt::format("{} s", *budget_seconds)
-                            : fmt::format("{} steps", t.steps),
-             fit.starts, fit.steps, fit.learning_rate, heldout_trajectories) +
+  const std::string budget = budget_seconds ? fmt::format("budget {} s\n", *budget_seconds) : "";
+  return fmt::format("{}\n{}fit: starts {}, steps {}, rate {}\nheld out {}\n", v.training.text(),
+                     budget, fit.starts, fit.steps, fit.learning_rate, heldout_trajectories) +
          generate_config(set);
 }
 

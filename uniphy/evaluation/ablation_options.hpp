@@ -6,7 +6,8 @@
 
 #include "uniphy/config/config.hpp"
 #include "uniphy/data/generate_options.hpp"
-#include "uniphy/training/trainer.hpp"
+#include "uniphy/training/latent_fit.hpp"
+#include "uniphy/training/training_options.hpp"
 
 namespace uniphy {
 

@@ -45,7 +45,7 @@ std::string ablation_table(const std::vector<AblationRow>& rows,
       "stress | projection | roll-out | not finished |\n"
       "|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
   for (const AblationRow& row : rows) {
-    const NetworkOptions& n = row.variant.training.network;
+    const models::LearnedLawOptions& n = row.variant.training.law;
     text += fmt::format(
         "| {} | {} | {} x {} | {} | {} x {} | {:g} | {:g} | {:.0f} | {:.0f} | {} | "
         "{} | {} | {:g} |\n",
@@ -72,7 +72,7 @@ std::string ablation_csv(const std::vector<AblationRow>& rows) {
   for (const auto& [name, unused] : rows.front().metrics.entries()) csv += "," + name;
   csv += "\n";
   for (const AblationRow& row : rows) {
-    const NetworkOptions& n = row.variant.training.network;
+    const models::LearnedLawOptions& n = row.variant.training.law;
     csv += fmt::format("{},{},{},{},{},{},{},{}", row.variant.name, row.variant.group,
                        kernels::form_name(n.form), kernels::activation_name(n.activation),
                        n.hidden_layers, n.width, n.latent_size, row.variant.trajectories);

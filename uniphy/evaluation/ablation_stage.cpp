@@ -43,8 +43,8 @@ HeldoutSet heldout_set(const AblationOptions& o, const RunDirectory& out) {
   return set;
 }
 
-/// steps_within, measured once and kept: an interrupted training must go on with the number that it
-/// began with.
+/// steps_within, measured once and kept: an interrupted training must resume with the number that
+/// it began with.
 std::int64_t steps_for(double seconds, const Dataset& data, const TrainingOptions& training,
                        const RunDirectory& out) {
   const std::filesystem::path file = out.file("steps.txt");
@@ -77,22 +77,20 @@ Metrics make(const AblationVariant& variant, const AblationOptions& o, const Hel
   const Dataset data = training_set(o, variant, all);
   TrainingOptions training = variant.training;
   if (o.budget_seconds) training.steps = steps_for(*o.budget_seconds, data, training, out);
-  const TrainingResult result = train(data, training, out.file("checkpoint.pt"), &heldout.data);
-  write_model(out.file("model.h5"), model_file(result.networks, result.z, data, out.config_yaml()),
-              true);
+  const LawColumns heldout_columns = law_columns(heldout.data, training.law.form);
+  const TrainingResult result = train(data, training, out.file("checkpoint.pt"), &heldout_columns);
+  const models::TrainedModel& model = result.model;
+  write_model(out.file("model.h5"), models::model_file(model, out.config_yaml()), true);
   write_training_curves(out, result.history);
   Metrics metrics;
-  metrics.set("parameters", double(result.networks.parameter_count()));
+  metrics.set("parameters", double(model.law->parameter_count()));
   metrics.set("steps", double(training.steps));
   metrics.set("train_s", result.seconds);
 
-  const auto weights =
-      std::make_shared<const kernels::LearnedLawWeights>(result.networks.weights());
+  const auto weights = std::make_shared<const kernels::LearnedLawWeights>(model.law->weights());
   LatentFitOptions fit_options = o.fit;
-  fit_options.error_floor = training.error_floor;
-  fit_options.delta = training.delta;
-  fit_options.latent_sigma = training.latent_sigma;
-  const HeldoutFit fit = fit_heldout(heldout.data, result.networks, result.z, weights, fit_options);
+  fit_options.loss = training.loss;
+  const HeldoutFit fit = fit_heldout(heldout.data, heldout_columns, model, weights, fit_options);
   const auto laws = learned_laws(weights, fit.latents);
   metrics.set("law_ns", law_cost(laws.front(), heldout.data));
   const std::vector<RolloutError> rollouts = rollout_errors(heldout.setups, laws);

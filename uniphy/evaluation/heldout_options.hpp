@@ -4,7 +4,7 @@
 
 #include "uniphy/data/generate_options.hpp"
 #include "uniphy/evaluation/law_checks.hpp"
-#include "uniphy/training/trainer.hpp"
+#include "uniphy/training/latent_fit.hpp"
 
 namespace uniphy {
 

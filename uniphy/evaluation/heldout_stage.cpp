@@ -29,7 +29,7 @@ HeldoutOptions read(Section& config) {
   o.model = config.input_file("model", "models/pretrained/unified.h5", "the trained law");
   o.draw.trajectories = 8;
   read_draw_options(config, o.draw);
-  o.fit = read_latent_fit_options(config);
+  o.fit = read_latent_fit_options(config, true);
   Section rest = config.section("rest", "a sphere that is left alone, without gravity");
   o.rest.steps = rest.integer("steps", o.rest.steps, at_least(1), "", "of every code");
   o.rest.particles = rest.integer("particles", o.rest.particles, between(8, 100000), "", "about");
@@ -55,14 +55,7 @@ class Stopwatch {
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
 
-torch::Tensor codes_of(const ModelFile& model) {
-  const auto options = torch::TensorOptions().dtype(torch::kFloat64);
-  return torch::tensor(model.latents, options)
-      .view({model.codes(), model.weights.latent_size})
-      .to(torch::kFloat32);
-}
-
-EvaluatedSet evaluate(Split split, const HeldoutOptions& o, const ModelFile& model,
+EvaluatedSet evaluate(Split split, const HeldoutOptions& o, const models::TrainedModel& model,
                       const Weights& weights, const RunDirectory& out, Stopwatch& watch) {
   EvaluatedSet set;
   set.name = split_name(split);
@@ -72,7 +65,7 @@ EvaluatedSet evaluate(Split split, const HeldoutOptions& o, const ModelFile& mod
   set.setups = setups_of(set.data);
   watch.add_to("draw_s");
   const HeldoutFit fit =
-      fit_heldout(set.data, Networks::from_weights(*weights), codes_of(model), weights, o.fit);
+      fit_heldout(set.data, law_columns(set.data, model.law->form()), model, weights, o.fit);
   set.law = fit.errors;
   set.laws = learned_laws(weights, fit.latents);
   watch.add_to("fit_s");
@@ -136,11 +129,12 @@ void run(const HeldoutOptions& o, RunDirectory& out, Metrics& metrics) {
     throw Error(o.model.string() + ": expected latent codes to start the fits from, found none");
   }
   const auto weights = std::make_shared<const kernels::LearnedLawWeights>(model.weights);
+  const models::TrainedModel trained = models::trained_model(model);
   Stopwatch watch(metrics);
   std::vector<EvaluatedSet> sets;
   double failed = 0;
   for (const Split split : {Split::heldout_all, Split::heldout_materials}) {
-    sets.push_back(evaluate(split, o, model, weights, out, watch));
+    sets.push_back(evaluate(split, o, trained, weights, out, watch));
     const EvaluatedSet& set = sets.back();
     const std::string prefix = split == Split::heldout_all ? "" : set.name + ".";
     report_law_errors(set.data, set.law, prefix, metrics);

@@ -3,7 +3,8 @@
 #include <ATen/CPUGeneratorImpl.h>
 #include <torch/torch.h>
 
-#include "uniphy/io/dataset.hpp"
+#include <cstdint>
+#include <vector>
 
 namespace uniphy {
 
@@ -11,13 +12,14 @@ namespace uniphy {
 /// alone, so that a resumed run draws what the uninterrupted one would have.
 class BatchSampler {
  public:
-  BatchSampler(const Dataset& data, std::uint64_t seed) : seed_(seed) {
-    const std::int64_t n = std::int64_t(data.trajectories.size());
+  /// The samples of trajectory i are first[i] ... first[i + 1] - 1.
+  BatchSampler(const std::vector<std::int64_t>& first, std::uint64_t seed) : seed_(seed) {
+    const std::int64_t n = std::int64_t(first.size()) - 1;
     first_ = torch::empty({n, 1}, torch::kFloat64);
     count_ = torch::empty({n, 1}, torch::kFloat64);
     for (std::int64_t i = 0; i < n; ++i) {
-      first_[i][0] = double(data.first[i]);
-      count_[i][0] = double(data.first[i + 1] - data.first[i]);
+      first_[i][0] = double(first[i]);
+      count_[i][0] = double(first[i + 1] - first[i]);
     }
   }
 

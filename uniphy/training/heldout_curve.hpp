@@ -20,10 +20,11 @@ struct HeldoutErrors {
 /// it happens; the codes that count are fitted anew after training (fit_latents).
 class HeldoutCurve {
  public:
-  HeldoutCurve(const Dataset& data, const TrainingOptions& options);
+  /// columns: of the held-out set, in the form of the law.
+  HeldoutCurve(const LawColumns& columns, const TrainingOptions& options);
 
   /// Draws depend on `step` alone, so a resumed run gives the same bits. rate: of Adam.
-  HeldoutErrors follow(const Networks& networks, std::int64_t step, double rate);
+  HeldoutErrors follow(const models::LearnedLaw& law, std::int64_t step, double rate);
 
   /// The state that a checkpoint keeps: [N, latent_size], and Adam's moments.
   const torch::Tensor& z() const { return z_; }

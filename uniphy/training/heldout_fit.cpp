@@ -2,23 +2,14 @@
 
 namespace uniphy {
 
-HeldoutFit fit_heldout(const Dataset& data, const Networks& networks,
-                       const torch::Tensor& training_z,
+HeldoutFit fit_heldout(const Dataset& data, const LawColumns& columns,
+                       const models::TrainedModel& model,
                        const std::shared_ptr<const kernels::LearnedLawWeights>& weights,
                        const LatentFitOptions& options) {
   HeldoutFit fit;
-  fit.latents = numbers_of(fit_latents(data, networks, training_z, options));
+  fit.latents = numbers_of(fit_latents(columns, model, options));
   fit.errors = law_errors(data, weights, fit.latents);
   return fit;
-}
-
-LatentFitOptions read_latent_fit_options(Section& config) {
-  Section fit = config.section("fit", "latents of the held-out trajectories");
-  LatentFitOptions o;
-  o.starts = fit.integer("starts", o.starts, between(1, 64), "", "training codes to try");
-  o.steps = fit.integer("steps", o.steps, at_least(1), "", "optimizer steps");
-  o.learning_rate = fit.real("learning_rate", o.learning_rate, Range{0, 1e3, true}, "", "of z");
-  return o;
 }
 
 std::vector<double> numbers_of(const torch::Tensor& tensor) {

@@ -3,9 +3,8 @@
 #include <memory>
 #include <vector>
 
-#include "uniphy/config/config.hpp"
+#include "uniphy/training/latent_fit.hpp"
 #include "uniphy/training/law_error.hpp"
-#include "uniphy/training/trainer.hpp"
 
 namespace uniphy {
 
@@ -16,14 +15,12 @@ struct HeldoutFit {
   std::vector<LawError> errors;  ///< [trajectories]
 };
 
-/// training_z: [codes, latent_size], where the fits start.
-HeldoutFit fit_heldout(const Dataset& data, const Networks& networks,
-                       const torch::Tensor& training_z,
+/// columns: those of the data. The fits start at codes of the model; weights: those of its law, as
+/// they simulate.
+HeldoutFit fit_heldout(const Dataset& data, const LawColumns& columns,
+                       const models::TrainedModel& model,
                        const std::shared_ptr<const kernels::LearnedLawWeights>& weights,
                        const LatentFitOptions& options);
-
-/// Declares and reads the section `fit`.
-LatentFitOptions read_latent_fit_options(Section& config);
 
 /// A tensor's numbers as float64, row-major.
 std::vector<double> numbers_of(const torch::Tensor& tensor);

@@ -1,5 +1,8 @@
 #include "uniphy/training/law_columns.hpp"
 
+#include <torch/torch.h>
+
+#include <algorithm>
 #include <cmath>
 
 #include "ops/kernels/learned/learned_law_weights.hpp"
@@ -28,12 +31,26 @@ void put_symmetric(float* to, const Mat3& m) {
 // A projection that changes a strain by less than this is rounding.
 constexpr double kNoDecrease = 1e-11;
 
-void isotropic_columns(const Dataset& data, std::int64_t s, float* row) {
+/// A sample, decomposed.
+struct Sample {
+  Mat3 F, P, C, tau;  ///< P = F_proj
+  kernels::Svd3<double> svd_F, svd_P;
+  kernels::HenckyStrain<double> trial, strain;  ///< of F and of P
+
+  Sample(const LawSamples& samples, std::int64_t s)
+      : F(load(samples.F, s)),
+        P(load(samples.F_proj, s)),
+        C(load(samples.C, s)),
+        tau(load(samples.tau, s)),
+        svd_F(kernels::svd3(F)),
+        svd_P(kernels::svd3(P)),
+        trial(kernels::hencky_strain(svd_F.sigma, false)),
+        strain(kernels::hencky_strain(svd_P.sigma, false)) {}
+};
+
+void isotropic_columns(const Sample& s, float* row) {
   using Column = SampleColumns;
-  const Mat3 F = load(data.samples.F, s), P = load(data.samples.F_proj, s);
-  const auto trial = kernels::hencky_strain(kernels::svd3(F).sigma, false);
-  const auto svd = kernels::svd3(P);
-  const auto strain = kernels::hencky_strain(svd.sigma, false);
+  const auto &trial = s.trial, &strain = s.strain;
   row[Column::trace] = float(trial.trace);
   for (int i = 0; i < 3; ++i) row[Column::deviator + i] = float(trial.deviator[i]);
   // Differences in float64: a viscoplastic law may take a millionth of the strain.
@@ -44,67 +61,73 @@ void isotropic_columns(const Dataset& data, std::int64_t s, float* row) {
   row[Column::norm_yields] = !cuts ? 0.0F : strain.norm < kNoDecrease ? 2.0F : 1.0F;
   row[Column::trace_yields] = trial.trace - strain.trace > kNoDecrease ? 1.0F : 0.0F;
   for (int i = 0; i < 3; ++i) row[Column::projected_deviator + i] = float(strain.deviator[i]);
-  const Mat3 rate = sym(load(data.samples.C, s)) * kernels::kTimeScale;
-  put_symmetric(row + Column::rate, tmul(svd.U, mul(rate, svd.U)));
-  put_symmetric(row + Column::stress, tmul(svd.U, mul(load(data.samples.tau, s), svd.U)));
+  const Mat3 rate = sym(s.C) * kernels::kTimeScale, &U = s.svd_P.U;
+  put_symmetric(row + Column::rate, tmul(U, mul(rate, U)));
+  put_symmetric(row + Column::stress, tmul(U, mul(s.tau, U)));
 }
 
-void published_columns(const Dataset& data, std::int64_t s, float* row) {
+void published_columns(const Sample& s, float* row) {
   using Column = PublishedColumns;
-  const Mat3 F = load(data.samples.F, s), P = load(data.samples.F_proj, s);
-  const auto trial = kernels::svd3(F), svd = kernels::svd3(P);
   float* in = row + Column::projection_in;
-  put(in, F);
-  put(in + 9, trial.U);
-  for (int i = 0; i < 3; ++i) in[18 + i] = float(trial.sigma[i]);
-  put(in + 21, transpose(trial.V_));
+  put(in, s.F);
+  put(in + 9, s.svd_F.U);
+  for (int i = 0; i < 3; ++i) in[18 + i] = float(s.svd_F.sigma[i]);
+  put(in + 21, transpose(s.svd_F.V_));
   in = row + Column::stress_in;
-  const Mat3 R = mult(svd.U, svd.V_);
-  for (int i = 0; i < 3; ++i) in[i] = float(svd.sigma[i]);
-  put(in + 3, tmul(P, P));
-  const double J = determinant(P), F_max = std::max(P(0, 0), 1e-6);
+  const Mat3 R = mult(s.svd_P.U, s.svd_P.V_);
+  for (int i = 0; i < 3; ++i) in[i] = float(s.svd_P.sigma[i]);
+  put(in + 3, tmul(s.P, s.P));
+  const double J = determinant(s.P), F_max = std::max(s.P(0, 0), 1e-6);
   in[12] = float(J);
   in[13] = float(std::log(std::max(J, 1e-6)));
   in[14] = float(F_max);
   in[15] = float(std::log(F_max));
-  put(in + 16, tmul(R, mul(load(data.samples.C, s), R)) * kernels::kTimeScale);
-  put(row + Column::delta, P - F);
-  put(row + Column::stress, tmul(R, mul(load(data.samples.tau, s), R)));
+  put(in + 16, tmul(R, mul(s.C, R)) * kernels::kTimeScale);
+  put(row + Column::delta, s.P - s.F);
+  put(row + Column::stress, tmul(R, mul(s.tau, R)));
 }
+
+/// Sums over the samples of a trajectory.
+struct Sums {
+  double stress = 0, strain = 0, decrease = 0;
+
+  void add(const Sample& s) {
+    stress += dot(s.tau, s.tau);
+    strain += dot(s.strain.eps, s.strain.eps);
+    const double dq = s.trial.norm - s.strain.norm, dt = s.trial.trace - s.strain.trace;
+    decrease += dq * dq + dt * dt / 3;
+  }
+  TrajectoryScale scale(std::int64_t samples) const {
+    const double count = double(std::max<std::int64_t>(1, samples));
+    TrajectoryScale s{std::sqrt(stress / count), std::sqrt(strain / count),
+                      std::sqrt(decrease / count)};
+    if (s.decrease < kNoDecrease) s.decrease = 0;
+    return s;
+  }
+};
 
 }  // namespace
 
 LawColumns law_columns(const Dataset& data, kernels::LawForm form) {
-  LawColumns result;
   const bool isotropic = form == kernels::LawForm::isotropic;
-  result.columns = isotropic ? int{SampleColumns::count} : int{PublishedColumns::count};
-  const std::int64_t samples = data.samples.size();
-  result.values.resize(std::size_t(samples * result.columns));
-#pragma omp parallel for schedule(static)
-  for (std::int64_t s = 0; s < samples; ++s) {
-    float* row = result.values.data() + s * result.columns;
-    isotropic ? isotropic_columns(data, s, row) : published_columns(data, s, row);
-  }
+  const std::int64_t columns = isotropic ? int{SampleColumns::count} : int{PublishedColumns::count};
+  LawColumns result;
+  result.form = form;
+  result.first = data.first;
+  result.values = torch::empty({data.samples.size(), columns}, torch::kFloat32);
+  float* values = result.values.data_ptr<float>();
   const std::int64_t trajectories = std::int64_t(data.trajectories.size());
   result.scales.resize(std::size_t(trajectories));
-#pragma omp parallel for schedule(static)
+#pragma omp parallel for schedule(dynamic)
   for (std::int64_t i = 0; i < trajectories; ++i) {
-    double stress = 0, strain = 0, decrease = 0;
-    for (std::int64_t s = data.first[i]; s < data.first[i + 1]; ++s) {
-      const auto trial =
-          kernels::hencky_strain(kernels::svd3(load(data.samples.F, s)).sigma, false);
-      const auto projected =
-          kernels::hencky_strain(kernels::svd3(load(data.samples.F_proj, s)).sigma, false);
-      const Mat3 tau = load(data.samples.tau, s);
-      stress += dot(tau, tau);
-      strain += dot(projected.eps, projected.eps);
-      const double dq = trial.norm - projected.norm, dt = trial.trace - projected.trace;
-      decrease += dq * dq + dt * dt / 3;
+    Sums sums;
+    for (std::int64_t k = data.first[i]; k < data.first[i + 1]; ++k) {
+      const Sample sample(data.samples, k);
+      float* row = values + k * columns;
+      isotropic ? isotropic_columns(sample, row) : published_columns(sample, row);
+      sums.add(sample);
     }
-    const double count = double(std::max<std::int64_t>(1, data.first[i + 1] - data.first[i]));
-    result.scales[i] = {std::sqrt(stress / count), std::sqrt(strain / count),
-                        std::sqrt(decrease / count)};
-    if (result.scales[i].decrease < kNoDecrease) result.scales[i].decrease = 0;
+    result.scales[i] = sums.scale(data.first[i + 1] - data.first[i]);
   }
   return result;
 }

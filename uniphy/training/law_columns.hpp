@@ -1,6 +1,7 @@
 #pragma once
 
-#include <array>
+#include <torch/types.h>
+
 #include <cstdint>
 #include <vector>
 
@@ -28,14 +29,19 @@ struct TrajectoryScale {
   double decrease = 0;  ///< RMS of the strain that the projection takes; 0 where it takes none
 };
 
+/// A data set as the objective sees it.
 struct LawColumns {
-  std::int64_t columns = 0;
-  std::vector<float> values;            ///< [S, columns]
+  kernels::LawForm form = kernels::LawForm::isotropic;
+  torch::Tensor values;                 ///< [S, PublishedColumns or SampleColumns::count] float32
   std::vector<TrajectoryScale> scales;  ///< [N]
+  std::vector<std::int64_t> first;      ///< [N + 1], as Dataset::first
+
+  std::int64_t trajectories() const { return static_cast<std::int64_t>(scales.size()); }
 };
 
 /// The columns of a form, PublishedColumns or kernels::SampleColumns, for every sample, in float64
-/// arithmetic, stored as float32.
+/// arithmetic. Each F and F_proj is decomposed once: what is made of a data set is to be kept for
+/// all that works on it.
 LawColumns law_columns(const Dataset& data, kernels::LawForm form);
 
 }  // namespace uniphy

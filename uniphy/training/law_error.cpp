@@ -14,12 +14,14 @@ std::vector<LawError> law_errors(const Dataset& data,
                                  const std::vector<double>& latents) {
   const std::int64_t n = std::int64_t(data.trajectories.size());
   const std::int64_t size = weights->latent_size;
+  // The stress is asked at the true projected F, so that one error does not count twice.
+  const auto projection_only = kernels::without_stress(*weights);
   const auto stress_only = kernels::without_projection(*weights);
   std::vector<LawError> errors(std::size_t(n), LawError{});
   for (std::int64_t i = 0; i < n; ++i) {
     kernels::LawDescription description;
     description.id = kernels::LawId::learned;
-    description.weights = weights;
+    description.weights = projection_only;
     description.z.assign(latents.begin() + i * size, latents.begin() + (i + 1) * size);
     const auto law = kernels::make_law<double>(description);
     const std::int64_t count = data.first[i + 1] - data.first[i];
@@ -32,7 +34,6 @@ std::vector<LawError> law_errors(const Dataset& data,
         unused(projected.size());
     const double dt = data.trajectories[i].dt;
     law->evaluate(count, dt, {F, 9, 1}, {C, 9, 1}, {projected.data(), 9, 1}, {unused.data(), 9, 1});
-    // The stress is asked at the true projected F, so that one error does not count twice.
     description.weights = stress_only;
     kernels::make_law<double>(description)
         ->evaluate(count, dt, {F_proj, 9, 1}, {C, 9, 1}, {unused.data(), 9, 1},

@@ -8,21 +8,12 @@ namespace {
 using torch::square;
 using torch::Tensor;
 
-/// The network on [N, m, features] with z [N, Z] beside every sample → [N, m, out].
-Tensor network(const ops::FlatLayers& layers, const Networks& networks, const Tensor& features,
-               const Tensor& z) {
-  return ops::mlp(features, z, layers, networks.options.activation);
-}
-
 }  // namespace
 
-Objective::Objective(const LawColumns& columns, kernels::LawForm form,
-                     const ops::ErrorMeasure& measure)
-    : form_(form), measure_(measure) {
-  const std::int64_t samples = std::int64_t(columns.values.size()) / columns.columns;
-  columns_ = torch::empty({samples, columns.columns}, torch::kFloat32);
-  std::copy(columns.values.begin(), columns.values.end(), columns_.data_ptr<float>());
-  scales_ = torch::empty({std::int64_t(columns.scales.size()), 3}, torch::kFloat32);
+Objective::Objective(const LawColumns& columns, const ops::ErrorMeasure& measure,
+                     const ObjectiveOps& ops)
+    : form_(columns.form), measure_(measure), ops_(ops), columns_(columns.values) {
+  scales_ = torch::empty({columns.trajectories(), 3}, torch::kFloat32);
   float* at = scales_.data_ptr<float>();
   for (const TrajectoryScale& s : columns.scales) {
     *at++ = float(s.stress);
@@ -31,49 +22,52 @@ Objective::Objective(const LawColumns& columns, kernels::LawForm form,
   }
 }
 
-LawErrors Objective::errors(const Networks& networks, const Tensor& z, const Tensor& rows,
+LawErrors Objective::errors(const models::LearnedLaw& law, const Tensor& z, const Tensor& rows,
                             const Tensor& scale_rows) const {
   const Tensor scale = scales_.index_select(0, scale_rows);
-  return form_ == kernels::LawForm::isotropic ? isotropic(networks, z, rows, scale)
-                                              : published(networks, z, rows, scale);
+  return form_ == kernels::LawForm::isotropic ? isotropic(law, z, rows, scale)
+                                              : published(law, z, rows, scale);
 }
 
-LawErrors Objective::isotropic(const Networks& networks, const Tensor& z, const Tensor& rows,
+LawErrors Objective::isotropic(const models::LearnedLaw& law, const Tensor& z, const Tensor& rows,
                                const Tensor& scale) const {
   const std::int64_t n = z.size(0);
   const ops::IsotropicBatch batch{columns_, rows};
-  const NetworkOptions& options = networks.options;
+  const auto answer = [&](const ops::FlatLayers& layers, const Tensor& features) {
+    return ops_.mlp(features, z, layers, law->activation());
+  };
+  const ops::FlatLayers &caps = law->networks().projection, &moduli = law->networks().stress;
   ops::IsotropicFeatures features;
-  if (options.state_caps || options.state_moduli) features = ops::isotropic_features(batch, z);
+  if (law->state_caps() || law->state_moduli()) features = ops_.isotropic_features(batch, z);
   ops::IsotropicAnswers answers;
-  answers.caps_rest = network(networks.projection, networks, torch::zeros({n, 1, 3}), z);
-  answers.caps = options.state_caps ? network(networks.projection, networks, features.projection, z)
-                                    : answers.caps_rest;
-  answers.moduli_rest = network(networks.stress, networks, torch::zeros({n, 1, 6}), z);
-  answers.moduli = options.state_moduli ? network(networks.stress, networks, features.stress, z)
-                                        : answers.moduli_rest;
-  const ops::LawLosses e = ops::law_losses(batch, scale, z, answers, measure_);
+  answers.caps_rest = answer(caps, torch::zeros({n, 1, 3}));
+  answers.caps = law->state_caps() ? answer(caps, features.projection) : answers.caps_rest;
+  answers.moduli_rest = answer(moduli, torch::zeros({n, 1, 6}));
+  answers.moduli = law->state_moduli() ? answer(moduli, features.stress) : answers.moduli_rest;
+  const ops::LawLosses e = ops_.law_losses(batch, scale, z, answers, measure_);
   const auto loss = [&e](kernels::IsotropicMean k) { return e.losses.select(1, k); };
   return {loss(kernels::kStressLoss), loss(kernels::kProjectionLoss), loss(kernels::kWholeLoss),
           loss(kernels::kShare),      e.errors.select(1, 0),          e.errors.select(1, 1)};
 }
 
-LawErrors Objective::published(const Networks& networks, const Tensor& z, const Tensor& rows,
+LawErrors Objective::published(const models::LearnedLaw& law, const Tensor& z, const Tensor& rows,
                                const Tensor& scale) const {
   using Column = PublishedColumns;
   const Tensor batch = columns_.index_select(0, rows.reshape({-1}))
                            .view({rows.size(0), rows.size(1), columns_.size(1)});
   const auto columns = [&batch](int first, int count) { return batch.narrow(2, first, count); };
   const Tensor s = kernels::kStressScale * torch::exp(kernels::kStressRate * z.select(1, 0));
+  const ops::LearnedNetworks& networks = law->networks();
   const Tensor delta =
-      network(networks.projection, networks, columns(Column::projection_in, 30), z);
+      ops_.mlp(columns(Column::projection_in, 30), z, networks.projection, networks.activation);
   const Tensor true_delta = columns(Column::delta, 9);
   const Tensor strain_rms = scale.select(1, 1).unsqueeze(1);
   const Tensor decrease_rms = scale.select(1, 2).unsqueeze(1);
   const Tensor unit = torch::where(decrease_rms > 0, decrease_rms, strain_rms);
   const Tensor projection = square(delta - true_delta).sum(2) /
                             (square(true_delta).sum(2) + square(measure_.floor * unit) + 1e-20);
-  const Tensor s1 = network(networks.stress, networks, columns(Column::stress_in, 25), z);
+  const Tensor s1 =
+      ops_.mlp(columns(Column::stress_in, 25), z, networks.stress, networks.activation);
   const Tensor matrix = s1.view({s1.size(0), s1.size(1), 3, 3});
   const Tensor symmetric = 0.5 * (matrix + matrix.transpose(2, 3)).reshape(s1.sizes());
   const Tensor tau = columns(Column::stress, 9);

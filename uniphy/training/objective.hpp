@@ -2,9 +2,9 @@
 
 #include <torch/torch.h>
 
+#include "models/learned_law.hpp"
 #include "ops/loss/law_losses.hpp"
 #include "uniphy/training/law_columns.hpp"
-#include "uniphy/training/networks.hpp"
 
 namespace uniphy {
 
@@ -33,28 +33,40 @@ struct LawErrors {
 /// better.
 enum class ReturnStage { whole, either, actual };
 
+/// What an objective evaluates: the fused ops. Plain tensor operations may take their place, to be
+/// compared with (uniphy/bench).
+struct ObjectiveOps {
+  torch::Tensor (*mlp)(const torch::Tensor& features, const torch::Tensor& z,
+                       const ops::FlatLayers& layers, kernels::Activation activation) = &ops::mlp;
+  decltype(&ops::isotropic_features) isotropic_features = &ops::isotropic_features;
+  decltype(&ops::law_losses) law_losses = &ops::law_losses;
+};
+
 /// The differentiable errors of the learned law on samples grouped by trajectory; the loss of
 /// Algorithm 1 and of a latent fit.
 class Objective {
  public:
-  /// Copies the columns into a tensor.
-  Objective(const LawColumns& columns, kernels::LawForm form, const ops::ErrorMeasure& measure);
+  /// Shares the columns.
+  Objective(const LawColumns& columns, const ops::ErrorMeasure& measure,
+            const ObjectiveOps& ops = {});
 
-  /// rows: [N, m] sample indices, row i of trajectory scale_rows[i]; z: [N, latent_size].
-  LawErrors errors(const Networks& networks, const torch::Tensor& z, const torch::Tensor& rows,
+  /// rows: [N, m] sample indices, row i of trajectory scale_rows[i]; z: [N, latent_size]. The law
+  /// has the form of the columns.
+  LawErrors errors(const models::LearnedLaw& law, const torch::Tensor& z, const torch::Tensor& rows,
                    const torch::Tensor& scale_rows) const;
 
   /// The loss of every trajectory, [N]: that of the stress, and that of the projection.
   static torch::Tensor loss(const LawErrors& errors, ReturnStage stage);
 
  private:
-  LawErrors isotropic(const Networks& networks, const torch::Tensor& z, const torch::Tensor& rows,
-                      const torch::Tensor& scale) const;
-  LawErrors published(const Networks& networks, const torch::Tensor& z, const torch::Tensor& rows,
-                      const torch::Tensor& scale) const;
+  LawErrors isotropic(const models::LearnedLaw& law, const torch::Tensor& z,
+                      const torch::Tensor& rows, const torch::Tensor& scale) const;
+  LawErrors published(const models::LearnedLaw& law, const torch::Tensor& z,
+                      const torch::Tensor& rows, const torch::Tensor& scale) const;
 
   kernels::LawForm form_;
   ops::ErrorMeasure measure_;
+  ObjectiveOps ops_;
   torch::Tensor columns_;  ///< [S, columns]
   torch::Tensor scales_;   ///< [N, 3]: stress, strain, decrease
 };

@@ -23,10 +23,8 @@ TrainStageOptions read(Section& config) {
   o.heldout = config.input_file("heldout", "", "data set for the held-out errors, or none");
 
   o.training = read_training_options(config, {}, true);
-  o.fit = read_latent_fit_options(config);
-  o.fit.error_floor = o.training.error_floor;
-  o.fit.delta = o.training.delta;
-  o.fit.latent_sigma = o.training.latent_sigma;
+  o.fit = read_latent_fit_options(config, false);
+  o.fit.loss = o.training.loss;
   return o;
 }
 
@@ -38,20 +36,25 @@ RunFunction train_stage(Section& config) {
     at::set_num_threads(out.threads());
     const Dataset data = read_dataset(o.data);
     Dataset heldout;
-    if (!o.heldout.empty()) heldout = read_dataset(o.heldout);
-    const TrainingResult result =
-        train(data, o.training, out.file("checkpoint.pt"), o.heldout.empty() ? nullptr : &heldout);
-    metrics.set("train_s", result.seconds);
-    metrics.set("parameters", double(result.networks.parameter_count()));
-    metrics.set("loss", result.history.back().loss);
-    write_model(out.file("model.h5"),
-                model_file(result.networks, result.z, data, out.config_yaml()), true);
-    write_training_curves(out, result.history);
-    plot_latents(out, result.z, data);
-    const auto weights = std::make_shared<kernels::LearnedLawWeights>(result.networks.weights());
-    report_law_errors(data, law_errors(data, weights, numbers_of(result.z)), "train.", metrics);
+    LawColumns heldout_columns;
     if (!o.heldout.empty()) {
-      const HeldoutFit fit = fit_heldout(heldout, result.networks, result.z, weights, o.fit);
+      heldout = read_dataset(o.heldout);
+      heldout_columns = law_columns(heldout, o.training.law.form);
+    }
+    const TrainingResult result = train(data, o.training, out.file("checkpoint.pt"),
+                                        o.heldout.empty() ? nullptr : &heldout_columns);
+    const models::TrainedModel& model = result.model;
+    metrics.set("train_s", result.seconds);
+    metrics.set("parameters", double(model.law->parameter_count()));
+    metrics.set("loss", result.history.back().loss);
+    write_model(out.file("model.h5"), models::model_file(model, out.config_yaml()), true);
+    write_training_curves(out, result.history);
+    plot_latents(out, model.codes);
+    const auto weights = std::make_shared<kernels::LearnedLawWeights>(model.law->weights());
+    report_law_errors(data, law_errors(data, weights, numbers_of(model.codes->z)), "train.",
+                      metrics);
+    if (!o.heldout.empty()) {
+      const HeldoutFit fit = fit_heldout(heldout, heldout_columns, model, weights, o.fit);
       report_law_errors(heldout, fit.errors, "heldout.", metrics);
     }
   };

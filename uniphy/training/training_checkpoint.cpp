@@ -28,13 +28,7 @@ std::string fingerprint(const Dataset& data, const TrainingOptions& o, HeldoutCu
     codes.add(z.data_ptr(), z.nbytes());
     beside = " heldout " + codes.text();
   }
-  return fmt::format(
-      "{} {} caps {} moduli {} latent {} layers {} width {} seed {} steps {} batch {} rate {} x {} "
-      "decay {} sigma {} floor {} delta {} clip {} data {}{}",
-      kernels::form_name(o.network.form), kernels::activation_name(o.network.activation),
-      o.network.state_caps, o.network.state_moduli, o.network.latent_size, o.network.hidden_layers,
-      o.network.width, o.seed, o.steps, o.batch_per_trajectory, o.learning_rate, o.latent_rate,
-      o.weight_decay, o.latent_sigma, o.error_floor, o.delta, o.clip, hash.text(), beside);
+  return fmt::format("{} data {}{}", o.text(), hash.text(), beside);
 }
 
 }  // namespace
@@ -54,10 +48,9 @@ void TrainingCheckpoint::save(std::int64_t step) const {
   archive.write("fingerprint", c10::IValue(fingerprint_));
   archive.write("step", c10::IValue(step));
   archive.write("seconds", c10::IValue(state_.seconds));
-  archive.write("z", state_.z.detach());
-  const std::vector<torch::Tensor> parameters = state_.networks.parameters();
-  for (std::size_t k = 0; k < parameters.size(); ++k)
-    archive.write("parameter_" + std::to_string(k), parameters[k].detach());
+  archive.write("z", state_.model.codes->z.detach());
+  for (const auto& parameter : state_.model.law->named_parameters())
+    archive.write(parameter.key(), parameter.value().detach());
   torch::Tensor history =
       torch::empty({std::int64_t(state_.history.size()), kHistoryColumns}, torch::kFloat64);
   double* at = history.data_ptr<double>();
@@ -114,10 +107,9 @@ std::int64_t TrainingCheckpoint::load() {
       if (value.sizes() != into.sizes()) throw Error(name + " has another shape");
       into.copy_(value);
     };
-    restore("z", state_.z);
-    const std::vector<torch::Tensor> parameters = state_.networks.parameters();
-    for (std::size_t k = 0; k < parameters.size(); ++k)
-      restore("parameter_" + std::to_string(k), parameters[k]);
+    restore("z", state_.model.codes->z);
+    for (const auto& parameter : state_.model.law->named_parameters())
+      restore(parameter.key(), parameter.value());
     torch::Tensor history;
     archive.read("history", history);
     if (history.dim() != 2 || history.size(1) != kHistoryColumns) {

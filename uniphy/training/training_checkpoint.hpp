@@ -16,7 +16,7 @@ class TrainingCheckpoint {
   TrainingCheckpoint(std::filesystem::path file, const Dataset& data,
                      const TrainingOptions& options, TrainingResult& state,
                      torch::optim::AdamW& optimizer, HeldoutCurve* heldout = nullptr);
-  /// Fills the state from the file; returns the step to go on from, 0 where there is no file.
+  /// Fills the state from the file; returns the step to resume from, 0 where there is no file.
   std::int64_t load();
   void save(std::int64_t step) const;
 

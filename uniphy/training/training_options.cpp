@@ -1,35 +1,34 @@
 #include "uniphy/training/training_options.hpp"
 
+#include <fmt/format.h>
+
 namespace uniphy {
 
 TrainingOptions read_training_options(Section& config, const TrainingOptions& defaults,
                                       bool with_steps) {
   TrainingOptions options = defaults;
   Section model = config.section("model", "the form and size of the law");
-  NetworkOptions& network = options.network;
-  network.form = kernels::form_from_name(model.choice(
-      "form", kernels::form_name(network.form), {"isotropic", "published"}, "form of the law"));
-  network.activation = kernels::activation_from_name(
-      model.choice("activation", kernels::activation_name(network.activation),
+  models::LearnedLawOptions& law = options.law;
+  law.form = kernels::form_from_name(model.choice("form", kernels::form_name(law.form),
+                                                  {"isotropic", "published"}, "form of the law"));
+  law.activation = kernels::activation_from_name(
+      model.choice("activation", kernels::activation_name(law.activation),
                    {"gelu", "silu", "squareplus"}, "of the hidden layers"));
-  network.latent_size = model.integer("latent_size", network.latent_size, between(1, 256), "",
-                                      "numbers in a latent code");
-  if (network.form == kernels::LawForm::isotropic && network.latent_size < 2 &&
-      !config.describing()) {
+  law.latent_size = model.integer("latent_size", law.latent_size, between(1, 256), "",
+                                  "numbers in a latent code");
+  if (law.form == kernels::LawForm::isotropic && law.latent_size < 2 && !config.describing()) {
     model.fail("latent_size", "expected 2 or more: form isotropic takes its scales from two");
   }
-  network.hidden_layers =
-      model.integer("hidden_layers", network.hidden_layers, between(0, 16), "", "of each network");
+  law.hidden_layers =
+      model.integer("hidden_layers", law.hidden_layers, between(0, 16), "", "of each network");
   const auto answers_to_state = [&model](const char* key, bool state, const char* what) {
     return model.choice(key, state ? "state" : "constant", {"state", "constant"},
                         std::string("isotropic form: ") + what +
                             " as functions of the state and z, or of z alone") == "state";
   };
-  network.state_caps = answers_to_state("caps", network.state_caps, "the caps of the projection");
-  network.state_moduli =
-      answers_to_state("moduli", network.state_moduli, "the moduli of the stress");
-  network.width =
-      model.integer("width", network.width, between(1, 1024), "", "of each hidden layer");
+  law.state_caps = answers_to_state("caps", law.state_caps, "the caps of the projection");
+  law.state_moduli = answers_to_state("moduli", law.state_moduli, "the moduli of the stress");
+  law.width = model.integer("width", law.width, between(1, 1024), "", "of each hidden layer");
 
   Section t = config.section("training", "AdamW on all trajectories at once");
   options.seed = std::uint64_t(
@@ -45,17 +44,25 @@ TrainingOptions read_training_options(Section& config, const TrainingOptions& de
                                "times learning_rate, for z");
   options.weight_decay =
       t.real("weight_decay", options.weight_decay, between(0, 100), "", "of AdamW");
-  options.latent_sigma =
-      t.real("latent_sigma", options.latent_sigma, Range{1e-6, 1e6}, "", "width of the prior of z");
-  options.error_floor = t.real("error_floor", options.error_floor, Range{0, 1e6, true}, "",
-                               "errors are relative to a sample's own size plus this share of "
-                               "the trajectory's RMS");
-  options.delta = t.real("delta", options.delta, Range{1e-12, 1e12}, "",
-                         "squared relative error below which the logarithm is linear");
+  read_loss_options(t, options.loss);
   options.clip = t.real("clip", options.clip, Range{0, 1e6, true}, "", "largest gradient norm");
+  options.caps_share =
+      t.real("caps_share", options.caps_share, between(0, 1), "",
+             "of the steps, the first ones: the projection is judged as if it returned the whole "
+             "way to its caps; then each trajectory may keep a share of its own");
   options.checkpoint_every =
       t.integer("checkpoint_every", options.checkpoint_every, at_least(1), "steps", "");
   return options;
+}
+
+std::string TrainingOptions::text() const {
+  return fmt::format(
+      "{} {} caps {} moduli {} latent {} layers {} width {} seed {} steps {} batch {} rate {} x {} "
+      "decay {} sigma {} prior {} floor {} delta {} clip {} caps share {}",
+      kernels::form_name(law.form), kernels::activation_name(law.activation), law.state_caps,
+      law.state_moduli, law.latent_size, law.hidden_layers, law.width, seed, steps,
+      batch_per_trajectory, learning_rate, latent_rate, weight_decay, loss.latent_sigma,
+      loss.prior_weight, loss.error_floor, loss.delta, clip, caps_share);
 }
 
 }  // namespace uniphy

@@ -45,8 +45,8 @@ void write_training_curves(const RunDirectory& out, const std::vector<TrainingPo
   plot_chart(out.file("training.png"), chart);
 }
 
-void plot_latents(const RunDirectory& out, const torch::Tensor& z, const Dataset& data) {
-  const torch::Tensor x = z.detach().to(torch::kFloat64);
+void plot_latents(const RunDirectory& out, const models::LatentCodes& codes) {
+  const torch::Tensor x = codes->z.detach().to(torch::kFloat64);
   const torch::Tensor centred = x - x.mean(0, true);
   if (centred.size(1) < 2 || centred.size(0) < 2) return;
   const torch::Tensor axes = std::get<1>(torch::linalg_eigh(centred.t().mm(centred)));
@@ -63,18 +63,19 @@ void plot_latents(const RunDirectory& out, const torch::Tensor& z, const Dataset
   by_mu.series.emplace_back();
   by_mu.series.back().points = true;
   Series& all = by_mu.series.back();
-  for (std::size_t i = 0; i < data.trajectories.size(); ++i) {
-    const TrajectoryRecord& record = data.trajectories[i];
-    if (by_material.series.empty() || by_material.series.back().label != record.material) {
+  for (std::size_t i = 0; i < codes->materials().size(); ++i) {
+    const std::string& material = codes->materials()[i];
+    if (by_material.series.empty() || by_material.series.back().label != material) {
       by_material.series.emplace_back();
-      by_material.series.back().label = record.material;
+      by_material.series.back().label = material;
       by_material.series.back().points = true;
     }
     for (Series* series : {&by_material.series.back(), &all}) {
       series->x.push_back(at[2 * i + 1]);
       series->y.push_back(at[2 * i]);
     }
-    all.colour.push_back(std::log10(record.parameters[0]));  // not finite where there is none
+    all.colour.push_back(
+        std::log10(codes->material_parameters()[i][0]));  // not finite where there is none
   }
   plot_chart(out.file("latents.png"), by_material);
   plot_chart(out.file("latents_mu.png"), by_mu);

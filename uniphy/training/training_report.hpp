@@ -12,9 +12,9 @@ namespace uniphy {
 /// history.csv and training.png; held-out curves where the history has them.
 void write_training_curves(const RunDirectory& out, const std::vector<TrainingPoint>& history);
 
-/// The codes z [N, latent_size] of the trajectories in their first two principal components:
+/// The codes in their first two principal components:
 /// latents.png coloured by material, latents_mu.png by log10 of mu (newtonian: its viscosity).
 /// Nothing where there are fewer than two codes or coordinates.
-void plot_latents(const RunDirectory& out, const torch::Tensor& z, const Dataset& data);
+void plot_latents(const RunDirectory& out, const models::LatentCodes& codes);
 
 }  // namespace uniphy

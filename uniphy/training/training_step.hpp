@@ -8,7 +8,7 @@
 namespace uniphy {
 
 /// AdamW on the weights (group 0) and on the codes z (group 1, without decay).
-torch::optim::AdamW make_optimizer(const Networks& networks, const torch::Tensor& z,
+torch::optim::AdamW make_optimizer(const models::TrainedModel& model,
                                    const TrainingOptions& options);
 
 struct TrainingStep {
@@ -17,8 +17,8 @@ struct TrainingStep {
 };
 /// One step of Algorithm 1 on the samples `rows` [N, m] of all trajectories: the loss, its
 /// gradient, and the optimizer's step.
-TrainingStep training_step(const Objective& objective, const Networks& networks,
-                           const torch::Tensor& z, const torch::Tensor& rows, ReturnStage stage,
+TrainingStep training_step(const Objective& objective, const models::TrainedModel& model,
+                           const torch::Tensor& rows, ReturnStage stage,
                            const TrainingOptions& options, torch::optim::AdamW& optimizer);
 
 }  // namespace uniphy

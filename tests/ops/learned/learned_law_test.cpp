@@ -102,7 +102,7 @@ class LearnedLawOp : public ::testing::TestWithParam<Parameters> {
 
 TEST_P(LearnedLawOp, FollowsItsReference) {
   const SharedWeights w = weights();
-  const auto reference_law = reference::to_tensors(*w, torch::kFloat64);
+  const auto reference_law = to_networks(*w, torch::kFloat64);
   double largest = 0;
   // Where singular values meet, U and V are not unique and the published form has no one answer.
   const double gap = form() == LawForm::published ? 5e-5 : 0;
@@ -242,7 +242,7 @@ TEST_P(LearnedLawOp, HasTheSameBitsOnEveryThreadCount) {
 }
 
 TEST_P(LearnedLawOp, ReferenceGradientsAreFiniteEverywhere) {
-  const auto law = reference::to_tensors(*weights(), torch::kFloat64);
+  const auto law = to_networks(*weights(), torch::kFloat64);
   Tensor F = torch::zeros({6, 3, 3}, torch::kFloat64);
   F[0] = torch::eye(3);
   F[2] = 1e-8 * torch::eye(3);
@@ -260,7 +260,7 @@ TEST_P(LearnedLawOp, ReferenceGradientsAreFiniteEverywhere) {
 }
 
 TEST_P(LearnedLawOp, ReferenceTakesALatentForEachParticle) {
-  const auto law = reference::to_tensors(*weights(), torch::kFloat64);
+  const auto law = to_networks(*weights(), torch::kFloat64);
   const Tensor F = generic_deformations(4, 0.2, 13), C = rates(F);
   const Tensor z = 0.3 * torch::randn({4, 5}, torch::kFloat64);
   const Tensor projected = reference::learned_project(law, F, z);

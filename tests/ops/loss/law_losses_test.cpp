@@ -6,7 +6,6 @@
 #include <gtest/gtest.h>
 #include <torch/torch.h>
 
-#include "ops/base/plain_tensors.hpp"
 #include "ops/reference/law_losses.hpp"
 #include "tests/support/error_of.hpp"
 #include "tests/support/law_loss_tensors.hpp"
@@ -26,14 +25,13 @@ TEST(LawLosses, ValuesAndGradientsMatchPlainTensors) {
       const Inputs in(c, type), wide(c, torch::kFloat64);
       const LawLosses got = in.errors();
       const std::vector<Tensor> g = in.gradients();
-      const PlainTensors plain;
-      const LawLosses want = wide.errors();
+      const LawLosses want = wide.errors(&reference::law_losses);
       EXPECT_LE(testing::relative_difference(got.losses.to(torch::kFloat64), want.losses),
                 tolerance);
       EXPECT_LE(testing::relative_difference(got.errors.to(torch::kFloat64), want.errors),
                 tolerance);
       EXPECT_FALSE(got.errors.requires_grad());
-      const std::vector<Tensor> expected = wide.gradients();
+      const std::vector<Tensor> expected = wide.gradients(&reference::law_losses);
       for (std::size_t k = 0; k < g.size(); ++k) {
         EXPECT_GT(expected[k].norm().item<double>(), 0) << k;
         EXPECT_LE(testing::relative_difference(g[k].to(torch::kFloat64), expected[k]), tolerance)
@@ -50,17 +48,13 @@ TEST(LawLosses, GradientsAgreeWithCentralDifferences) {
 
 TEST(LawLosses, AnswersAtRestMayBeTheAnswersThemselves) {
   const Inputs in(testing::law_loss_case(4, 37, false, false), torch::kFloat64);
-  const auto loss = [&] {
-    return (in.seed * law_losses(in.batch, in.scales, in.leaves[0],
-                                 {in.leaves[1], in.leaves[1], in.leaves[3], in.leaves[3]},
-                                 in.measure)
-                          .losses)
-        .sum();
+  const auto loss = [&](decltype(&law_losses) losses) {
+    const IsotropicAnswers answers{in.leaves[1], in.leaves[1], in.leaves[3], in.leaves[3]};
+    return (in.seed * losses(in.batch, in.scales, in.leaves[0], answers, in.measure).losses).sum();
   };
   const std::vector<Tensor> of{in.leaves[1], in.leaves[3]};
-  const auto got = torch::autograd::grad({loss()}, of);
-  const PlainTensors plain;
-  const auto want = torch::autograd::grad({loss()}, of);
+  const auto got = torch::autograd::grad({loss(&law_losses)}, of);
+  const auto want = torch::autograd::grad({loss(&reference::law_losses)}, of);
   for (std::size_t k = 0; k < of.size(); ++k)
     EXPECT_LE(testing::relative_difference(got[k], want[k]), 1e-11);
 }

@@ -6,8 +6,8 @@
 #include <gtest/gtest.h>
 #include <torch/torch.h>
 
-#include "ops/base/plain_tensors.hpp"
 #include "ops/kernels/base/error.hpp"
+#include "ops/reference/mlp.hpp"
 #include "tests/support/network_cases.hpp"
 
 namespace uniphy::ops {
@@ -25,7 +25,7 @@ TEST_P(MlpTest, ValueAndGradientsMatchPlainTensors) {
       const auto l = network_layers(widths, torch::kFloat64);
       const Tensor x = torch::randn({samples, widths.front()}, torch::kFloat64).requires_grad_();
       const Tensor seed = torch::randn({samples, widths.back()}, torch::kFloat64);
-      const Tensor y = mlp(x, l, GetParam()), expected = mlp_reference(x, l, GetParam());
+      const Tensor y = mlp(x, l, GetParam()), expected = reference::mlp(x, l, GetParam());
       EXPECT_LE((y - expected).abs().max().item<double>(), 1e-12);
       const auto got = torch::autograd::grad({y}, network_leaves(x, l), {seed});
       const auto want = torch::autograd::grad({expected}, network_leaves(x, l), {seed});
@@ -47,8 +47,7 @@ TEST_P(MlpTest, CodesOfManySamplesAreCodesBesideEverySample) {
     leaves.push_back(z);
     const Tensor y = mlp(features, z, l, GetParam());
     const auto got = torch::autograd::grad({y}, leaves, {seed});
-    const PlainTensors plain;
-    const Tensor expected = mlp(features, z, l, GetParam());
+    const Tensor expected = reference::mlp(features, z, flatten(l), GetParam());
     EXPECT_LE((y - expected).abs().max().item<double>(), 1e-12);
     const auto want = torch::autograd::grad({expected}, leaves, {seed});
     for (std::size_t k = 0; k < got.size(); ++k)
@@ -76,7 +75,7 @@ TEST_P(MlpTest, FloatsAreDoublesToRounding) {
                        .requires_grad_();
   const Tensor exact_x = x.detach().to(torch::kFloat64).requires_grad_();
   const Tensor y = mlp(x, identity(torch::kFloat32), GetParam());
-  const Tensor exact = mlp_reference(exact_x, identity(torch::kFloat64), GetParam());
+  const Tensor exact = reference::mlp(exact_x, identity(torch::kFloat64), GetParam());
   EXPECT_LE(((y - exact) / exact_x.abs().clamp_min(1)).abs().max().item<double>(), 3e-7);
   const Tensor slope = torch::autograd::grad({y.sum()}, {x})[0];
   const Tensor exact_slope = torch::autograd::grad({exact.sum()}, {exact_x})[0];
@@ -98,8 +97,7 @@ TEST_P(MlpTest, FlatLayersAreTheLayers) {
   const auto want = torch::autograd::grad({mlp(features, z, views, GetParam())},
                                           {flat.numbers, features, z}, {seed});
   for (std::size_t k = 0; k < got.size(); ++k) EXPECT_TRUE(torch::equal(got[k], want[k])) << k;
-  const PlainTensors plain;
-  EXPECT_LE((mlp(features, z, flat, GetParam()) - y).abs().max().item<double>(), 1e-12);
+  EXPECT_LE((reference::mlp(features, z, flat, GetParam()) - y).abs().max().item<double>(), 1e-12);
 }
 
 /// Whatever the order of memory, the same bits; what comes out has the order of what goes in.
@@ -117,17 +115,6 @@ TEST_P(MlpTest, TakesSamplesInPlanes) {
   }
   EXPECT_TRUE(torch::equal(values[0], values[1]));
   EXPECT_TRUE(torch::equal(gradients[0], gradients[1]));
-}
-
-TEST_P(MlpTest, PlainVersionStandsInWhileAskedFor) {
-  const auto l = network_layers({11, 20, 5}, torch::kFloat32);
-  const Tensor x = torch::randn({70, 11});
-  const Tensor fused = mlp(x, l, GetParam()), expected = mlp_reference(x, l, GetParam());
-  {
-    const PlainTensors plain;
-    EXPECT_TRUE(torch::equal(mlp(x, l, GetParam()), expected));
-  }
-  EXPECT_TRUE(torch::equal(mlp(x, l, GetParam()), fused));
 }
 
 TEST_P(MlpTest, SameBitsOnOneThreadAndTwo) {

@@ -38,7 +38,7 @@ TEST(Ablation, KeepsFinishedVariants) {
   EXPECT_GT(*first.find("base.law_ns"), 0);
   const std::string table = read_text_file(scratch.file("out/ablation.md"));
   EXPECT_THAT(table, HasSubstr("| base | isotropic | 1 x 8 | 4 | 5 x 2 | 260 | 12 | "));
-  EXPECT_THAT(table, HasSubstr("| seed | seed | 1 x 6 | 4 | 5 x 1 | "));
+  EXPECT_THAT(table, HasSubstr("| published | published | 1 x 6 | 4 | 5 x 1 | "));
   const std::string csv = read_text_file(scratch.file("out/ablation.csv"));
   EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 3);
 
@@ -48,8 +48,8 @@ TEST(Ablation, KeepsFinishedVariants) {
   std::filesystem::remove_all(scratch.file("out/published"));
   const Metrics again = testing::run_stage(ablation_stage, yaml, scratch.file("out"), 1);
   EXPECT_EQ(again.find("base.train_s"), first.find("base.train_s"));
-  EXPECT_EQ(again.find("seed.stress_error"), first.find("seed.stress_error"));
-  EXPECT_EQ(again.find("seed.rollouts_failed"), first.find("seed.rollouts_failed"));
+  EXPECT_EQ(again.find("published.stress_error"), first.find("published.stress_error"));
+  EXPECT_EQ(again.find("published.rollouts_failed"), first.find("published.rollouts_failed"));
 }
 
 TEST(Ablation, OtherSettingsAreNotMixed) {

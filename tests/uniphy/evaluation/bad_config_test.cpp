@@ -88,7 +88,7 @@ INSTANTIATE_TEST_SUITE_P(
                   "variants:\n  - {name: a, training: {steps: 5}}\n",
                   "c.yaml:2: variants.0.training.steps: unknown key; known keys here: seed, "
                   "batch_per_trajectory, learning_rate, latent_rate, weight_decay, latent_sigma, "
-                  "error_floor, delta, clip, checkpoint_every"},
+                  "prior_weight, error_floor, delta, clip, caps_share, checkpoint_every"},
         BadConfig{
             "OneLatentNumber", ablation_stage,
             "variants:\n  - {name: a, model: {latent_size: 1}}\n",

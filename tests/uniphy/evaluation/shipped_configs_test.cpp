@@ -57,7 +57,7 @@ TEST(ShippedConfigs, AblateEverySizeOfTheIssue) {
   std::vector<std::int64_t> widths, latents, trajectories;
   int published_form = 0;
   for (const AblationVariant& v : o.variants) {
-    const NetworkOptions& n = v.training.network;
+    const models::LearnedLawOptions& n = v.training.law;
     EXPECT_EQ(v.training.steps, o.variants[0].training.steps) << v.name;
     // Every step of every variant sees as many samples, to 2 %.
     EXPECT_NEAR(static_cast<double>(v.trajectories * v.training.batch_per_trajectory), 2560, 52);

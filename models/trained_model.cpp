@@ -1,0 +1,17 @@
+#include "models/trained_model.hpp"
+
+namespace uniphy::models {
+
+TrainedModel trained_model(const ModelFile& file, torch::Dtype dtype) {
+  return {LearnedLaw(file.weights, dtype), LatentCodes(file, dtype)};
+}
+
+ModelFile model_file(const TrainedModel& model, const std::string& config) {
+  ModelFile file;
+  file.weights = model.law->weights();
+  model.codes->store(file);
+  file.config = config;
+  return file;
+}
+
+}  // namespace uniphy::models
