@@ -6,8 +6,8 @@ int main(int argc, char** argv) {
       {"uniphy_ablate",
        "Trains laws that differ in form, width, latent size or data with one budget and measures "
        "what each is worth on held-out trajectories and what it costs, so that the smallest law "
-       "that reaches an error can be read off. Finished variants are kept; an interrupted run goes "
-       "on where it stopped.",
+       "that reaches an error can be read off. Finished variants are kept; an interrupted run "
+       "resumes where it stopped.",
        {"CONFIG.yaml, nothing else: the data sets are drawn from its seed"},
        {"DIR/ablation.md             the tables", "DIR/ablation.csv            all numbers",
         "DIR/rollout_against_cost.png, stress_against_cost.png",

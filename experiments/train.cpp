@@ -11,7 +11,7 @@ int main(int argc, char** argv) {
       {"uniphy_train",
        "Trains one constitutive law for all trajectories of a data set (Algorithm 1): the weights "
        "of the projection and the stress network and one latent code per trajectory. An "
-       "interrupted run goes on where it stopped, to the same bits.",
+       "interrupted run resumes where it stopped, to the same bits.",
        {"data: a data set of uniphy_generate (HDF5)",
         "heldout: a second one whose latents follow the training and are fitted after it "
         "(optional)"},
