@@ -74,7 +74,8 @@ int main(int argc, char** argv) {
           const bool single = options.dtype == "float32";
           const auto law = out.file("law.pt"), weights = out.file("weights.h5");
           uniphy::models::save_script_law(law, model.weights,
-                                          single ? torch::kFloat32 : torch::kFloat64);
+                                          single ? torch::kFloat32 : torch::kFloat64,
+                                          {model.latents, model.materials, model.parameters});
           uniphy::write_model(weights, model, single);
           uniphy::read_model(weights);
           metrics.set("parameters", parameter_count(model.weights));

@@ -2,43 +2,22 @@
 
 #include <torch/torch.h>
 
-#include <array>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <system_error>
-#include <vector>
 
+#include "models/torchscript_names.hpp"
 #include "models/torchscript_source.hpp"
 #include "ops/kernels/base/error.hpp"
 
 namespace uniphy::models {
 
 namespace fs = std::filesystem;
-using torch::Tensor;
 
 namespace {
-
-std::string dtype_name(torch::Dtype dtype) {
-  if (dtype == torch::kFloat32) return "float32";
-  if (dtype == torch::kFloat64) return "float64";
-  return c10::toString(dtype);
-}
-
-[[noreturn]] void differs(const fs::path& file, const std::string& what,
-                          const std::string& expected, const std::string& found) {
-  throw Error(file.string() + ": " + what + ": expected " + expected + ", found " + found);
-}
-
-std::string quoted(const std::string& s) { return "\"" + s + "\""; }
-
-/// The first line of what LibTorch says, without its stack trace.
-std::string first_line(const c10::Error& e) {
-  const std::string text = e.what_without_backtrace();
-  return text.substr(0, text.find('\n'));
-}
 
 void add_network(torch::jit::Module& module, const std::string& name,
                  const kernels::MlpWeights& network, torch::Dtype dtype) {
@@ -53,101 +32,47 @@ void add_network(torch::jit::Module& module, const std::string& name,
   }
 }
 
-/// Reading attributes of a loaded module, with errors that quote what was found.
-class Attributes {
- public:
-  Attributes(const fs::path& file, const torch::jit::Module& module)
-      : file_(file), module_(module) {}
-
-  std::string text(const std::string& name) const {
-    const torch::IValue value = find(name);
-    if (!value.isString()) differs(file_, "attribute " + name, "a string", value.tagKind());
-    return value.toStringRef();
-  }
-  std::int64_t integer(const std::string& name) const {
-    const torch::IValue value = find(name);
-    if (!value.isInt()) differs(file_, "attribute " + name, "an integer", value.tagKind());
-    return value.toInt();
-  }
-  void expect(const std::string& name, const std::string& expected) const {
-    const std::string found = text(name);
-    if (found != expected) differs(file_, "attribute " + name, quoted(expected), quoted(found));
-  }
-
- private:
-  torch::IValue find(const std::string& name) const {
-    if (!module_.hasattr(name)) differs(file_, "attribute " + name, "to be there", "none");
-    return module_.attr(name);
-  }
-  const fs::path& file_;
-  const torch::jit::Module& module_;
-};
-
-/// Buffers of one network: of one dtype, each layer taking what the one before gives.
-void check_network(const fs::path& file, const torch::jit::Module& module, const std::string& name,
-                   torch::Dtype dtype, std::int64_t in, std::int64_t out) {
-  for (int k = 0;; ++k) {
-    const std::string weight_name = name + "_weight_" + std::to_string(k);
-    const std::string bias_name = name + "_bias_" + std::to_string(k);
-    if (!module.hasattr(weight_name)) {
-      if (k == 0) differs(file, "buffer " + weight_name, "to be there", "none");
-      break;
-    }
-    const Tensor weight = module.attr(weight_name).toTensor();
-    if (!module.hasattr(bias_name)) differs(file, "buffer " + bias_name, "to be there", "none");
-    const Tensor bias = module.attr(bias_name).toTensor();
-    for (const auto& [label, tensor] : {std::pair(weight_name, weight), std::pair(bias_name, bias)})
-      if (tensor.scalar_type() != dtype)
-        differs(file, "buffer " + label, "dtype " + dtype_name(dtype),
-                dtype_name(tensor.scalar_type()));
-    if (weight.dim() != 2 || weight.size(1) != in || bias.dim() != 1 ||
-        bias.size(0) != weight.size(0)) {
-      std::ostringstream found;
-      found << weight.sizes() << " and a bias of " << bias.sizes();
-      differs(file, "buffer " + weight_name, "[n, " + std::to_string(in) + "] and a bias of [n]",
-              found.str());
-    }
-    in = weight.size(0);
-  }
-  if (in != out)
-    differs(file, "network " + name, std::to_string(out) + " outputs", std::to_string(in));
+c10::List<std::string> names(const std::vector<std::string>& from) {
+  c10::List<std::string> list;
+  for (const std::string& name : from) list.push_back(name);
+  return list;
 }
 
-void check_method(const fs::path& file, const torch::jit::Module& module, const std::string& name,
-                  std::size_t arguments) {
-  const auto method = module.find_method(name);
-  if (!method) differs(file, "method " + name, "to be there", "none");
-  const std::size_t found = method->function().getSchema().arguments().size();
-  if (found != arguments + 1)  // and self
-    differs(file, "method " + name, std::to_string(arguments) + " arguments",
-            std::to_string(found - 1));
+void add_codes(torch::jit::Module& module, const ScriptCodes& codes, int latent_size,
+               torch::Dtype dtype) {
+  const std::size_t count = codes.materials.size();
+  if (codes.z.size() != count * std::size_t(latent_size) || codes.parameters.size() != count)
+    throw Error("TorchScript law: codes: expected [" + std::to_string(count) + ", " +
+                std::to_string(latent_size) + "] numbers and parameters of " +
+                std::to_string(count) + " codes, found " + std::to_string(codes.z.size()) +
+                " and " + std::to_string(codes.parameters.size()));
+  std::vector<double> parameters;
+  for (const auto& row : codes.parameters)
+    parameters.insert(parameters.end(), row.begin(), row.end());
+  const auto rows = static_cast<std::int64_t>(count);
+  module.register_buffer(
+      "codes", torch::tensor(codes.z, torch::kFloat64).reshape({rows, latent_size}).to(dtype));
+  module.register_buffer("material_parameters",
+                         torch::tensor(parameters, torch::kFloat64).reshape({rows, 5}));
+  const auto list = c10::ListType::create(c10::StringType::get());
+  module.register_attribute("materials", list, names(codes.materials));
+  module.register_attribute("parameter_names", list,
+                            names({kScriptParameterNames.begin(), kScriptParameterNames.end()}));
+  module.register_attribute("parameter_units", list,
+                            names({kScriptParameterUnits.begin(), kScriptParameterUnits.end()}));
 }
 
-torch::jit::Module read_archive(const fs::path& file) {
-  std::error_code error;
-  if (!fs::is_regular_file(file, error))
-    throw Error(file.string() + ": expected a TorchScript file, found no such file");
-  std::array<char, 4> magic{};
-  std::ifstream(file, std::ios::binary).read(magic.data(), magic.size());
-  if (magic != std::array<char, 4>{'P', 'K', 3, 4})
-    throw Error(file.string() +
-                ": expected a TorchScript file (a zip archive), found something else of " +
-                std::to_string(fs::file_size(file, error)) + " bytes");
-  try {
-    return torch::jit::load(file.string(), torch::kCPU);
-  } catch (const c10::Error& e) {
-    throw Error(file.string() + ": expected a whole TorchScript file, found one that LibTorch " +
-                "cannot read, truncated or damaged: " + first_line(e));
-  } catch (const std::exception& e) {
-    const std::string text = e.what();
-    throw Error(file.string() + ": expected a whole TorchScript file, found one that LibTorch " +
-                "cannot read, truncated or damaged: " + text.substr(0, text.find('\n')));
-  }
+void add_constants(torch::jit::Module& module, bool single_precision) {
+  c10::Dict<std::string, double> numbers;
+  for (const auto& [name, value] : script_constants(single_precision)) numbers.insert(name, value);
+  module.register_attribute(
+      "constants", c10::DictType::create(c10::StringType::get(), c10::FloatType::get()), numbers);
 }
 
 }  // namespace
 
-torch::jit::Module script_law(const kernels::LearnedLawWeights& weights, torch::Dtype dtype) {
+torch::jit::Module script_law(const kernels::LearnedLawWeights& weights, torch::Dtype dtype,
+                              const ScriptCodes& codes) {
   weights.check();
   if (dtype != torch::kFloat32 && dtype != torch::kFloat64)
     throw Error("TorchScript law: dtype: expected float32 or float64, found " + dtype_name(dtype));
@@ -164,14 +89,16 @@ torch::jit::Module script_law(const kernels::LearnedLawWeights& weights, torch::
   text("units", kScriptUnits);
   add_network(module, "projection", weights.projection, dtype);
   add_network(module, "stress", weights.stress, dtype);
+  add_codes(module, codes, weights.latent_size, dtype);
+  add_constants(module, dtype == torch::kFloat32);
   module.define(script_source(weights, dtype == torch::kFloat32));
   module.eval();
   return module;
 }
 
 void save_script_law(const fs::path& file, const kernels::LearnedLawWeights& weights,
-                     torch::Dtype dtype) {
-  const torch::jit::Module module = script_law(weights, dtype);
+                     torch::Dtype dtype, const ScriptCodes& codes) {
+  const torch::jit::Module module = script_law(weights, dtype, codes);
   const nlohmann::json metadata = {
       {"format", kScriptFormat},
       {"version", kScriptVersion},
@@ -180,8 +107,12 @@ void save_script_law(const fs::path& file, const kernels::LearnedLawWeights& wei
       {"latent_size", weights.latent_size},
       {"dtype", dtype_name(dtype)},
       {"units", kScriptUnits},
+      {"materials", codes.materials},
+      {"parameter_names", kScriptParameterNames},
+      {"parameter_units", kScriptParameterUnits},
       {"methods",
-       {{"project", "F [P, 3, 3], z [Z] or [P, Z] -> F_proj [P, 3, 3]"},
+       {{"code_of", "material (str) -> z [Z] of its first training trajectory"},
+        {"project", "F [P, 3, 3], z [Z] or [P, Z] -> F_proj [P, 3, 3]"},
         {"stress",
          "F_proj [P, 3, 3], C [P, 3, 3] in 1/s, z -> Kirchhoff stress [P, 3, 3] in Pa"}}}};
   // To memory first: LibTorch's own file writer ends the program where the disk is full.
@@ -200,47 +131,6 @@ void save_script_law(const fs::path& file, const kernels::LearnedLawWeights& wei
   }
   fs::rename(temporary, file, error);
   if (error) throw Error(file.string() + ": cannot write: " + error.message());
-}
-
-ScriptLaw load_script_law(const fs::path& file, std::optional<torch::Dtype> dtype) {
-  const torch::jit::Module module = read_archive(file);
-  const Attributes attributes(file, module);
-  attributes.expect("format", kScriptFormat);
-  const std::int64_t version = attributes.integer("version");
-  if (version != kScriptVersion)
-    differs(file, "attribute version", std::to_string(kScriptVersion), std::to_string(version));
-  attributes.expect("units", kScriptUnits);
-  ScriptLaw law;
-  law.module = module;
-  const std::string stored = attributes.text("dtype");
-  if (stored != "float32" && stored != "float64")
-    differs(file, "attribute dtype", "\"float32\" or \"float64\"", quoted(stored));
-  law.dtype = stored == "float32" ? torch::kFloat32 : torch::kFloat64;
-  if (dtype && *dtype != law.dtype)
-    differs(file, "attribute dtype", quoted(dtype_name(*dtype)), quoted(stored));
-  const std::string form = attributes.text("form");
-  if (form != "isotropic" && form != "published")
-    differs(file, "attribute form", "\"isotropic\" or \"published\"", quoted(form));
-  law.form = kernels::form_from_name(form);
-  law.latent_size = attributes.integer("latent_size");
-  if (law.latent_size < 0)
-    differs(file, "attribute latent_size", "0 or more", std::to_string(law.latent_size));
-  const auto shape = kernels::network_shape(law.form);
-  check_network(file, module, "projection", law.dtype, shape.projection_in + law.latent_size,
-                shape.projection_out);
-  check_network(file, module, "stress", law.dtype, shape.stress_in + law.latent_size,
-                shape.stress_out);
-  check_method(file, module, "project", 2);
-  check_method(file, module, "stress", 3);
-  return law;
-}
-
-Tensor ScriptLaw::project(const Tensor& F, const Tensor& z) const {
-  return module.run_method("project", F, z).toTensor();
-}
-
-Tensor ScriptLaw::stress(const Tensor& F_proj, const Tensor& C, const Tensor& z) const {
-  return module.run_method("stress", F_proj, C, z).toTensor();
 }
 
 }  // namespace uniphy::models

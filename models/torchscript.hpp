@@ -2,39 +2,73 @@
 
 // A trained law as a TorchScript file that runs without this project, in C++ and in Python:
 //
-//   python3 -c "import torch; m=torch.jit.load('law.pt');
-//               print(m.project(torch.eye(3)[None], torch.zeros(m.latent_size)))"
+//   python3 -c "import torch; m = torch.jit.load('law.pt'); z = m.code_of('sand')
+//               F = torch.eye(3)[None].requires_grad_(); print(m.project(F, z).sum().backward())"
 //
 //   methods     project(F, z) → F_proj and stress(F_proj, C, z) → tau; F, F_proj, C [P, 3, 3],
-//               P ≥ 0, z [latent_size] or [P, latent_size]. Computed in `dtype`, answered in the
-//               dtype of F. Not for differentiation at equal singular values.
-//   attributes  format = "uniphy-torchscript-law", version = 1, form, activation, latent_size,
-//               dtype = "float32" | "float64", units = "F: 1, C: 1/s, z: 1, tau: Pa"
-//   buffers     projection_weight_k [out, in], projection_bias_k [out], stress_... alike
+//               P ≥ 0, z [latent_size] or [P, latent_size], float32 or float64, finite; anything
+//               else is an error that names the argument. Computed in `dtype`, answered in the
+//               dtype of F.
+//               code_of(material) → z [latent_size] of the first training trajectory of a material
+//   attributes  format = "uniphy-torchscript-law", version = 2, form, activation, latent_size,
+//               dtype = "float32" | "float64", units = "F: 1, C: 1/s, z: 1, tau: Pa",
+//               materials [N] names of the laws behind the training codes,
+//               parameter_names and parameter_units [5] of the columns of material_parameters,
+//               constants {name: number} of the formulas (models/script/eager.py)
+//   buffers     codes [N, latent_size] in `dtype`, the codes of the training trajectories, and
+//               material_parameters [N, 5] float64, NaN where a law has none. A code by its
+//               parameters:  m.codes[i] for i with m.materials[i], m.material_parameters[i]
+//               projection_weight_k [out, in], projection_bias_k [out], stress_... alike
 //
-// The archive also holds the attributes as JSON, extra/metadata.json.
+// Derivatives. The first, by F, F_proj, C and z, is right at every F of the isotropic form, equal
+// singular values included (by divided differences, as in the kernels); where two singular values
+// sum to 0 (det F < 0, rank ≤ 1) the rotation jumps and the answer is bounded as in
+// ops/kernels/spectral/spectral.hpp. The published form has no derivative at equal singular values
+// (published_law.hpp); there the answer is the kernels', finite, with U and V held. Where F
+// requires a gradient a second derivative by anything is refused: PyTorch says that "the
+// derivative for '_cdist_backward' is not implemented". Where it does not, those by C and z are
+// PyTorch's own. Without a gradient of F none of this is computed.
+//
+// The methods are models/script/*.py. The archive also holds the attributes as JSON,
+// extra/metadata.json.
 
 #include <torch/script.h>
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "ops/kernels/learned/learned_law_weights.hpp"
 
 namespace uniphy::models {
 
 inline constexpr const char* kScriptFormat = "uniphy-torchscript-law";
-inline constexpr std::int64_t kScriptVersion = 1;
+inline constexpr std::int64_t kScriptVersion = 2;
 inline constexpr const char* kScriptUnits = "F: 1, C: 1/s, z: 1, tau: Pa";
 
-/// The module of a law; dtype is float32 or float64. Throws Error where the weights do not fit.
-torch::jit::Module script_law(const kernels::LearnedLawWeights& weights, torch::Dtype dtype);
+/// The columns of material_parameters; a newtonian law's mu is in Pa s.
+inline constexpr std::array<const char*, 5> kScriptParameterNames{"mu", "lambda", "tau_y", "theta",
+                                                                  "eta"};
+inline constexpr std::array<const char*, 5> kScriptParameterUnits{"Pa", "Pa", "Pa", "rad", "Pa s"};
+
+/// The training codes that a file carries; none by default.
+struct ScriptCodes {
+  std::vector<double> z;                          ///< [N, latent_size]
+  std::vector<std::string> materials;             ///< [N]
+  std::vector<std::array<double, 5>> parameters;  ///< [N], NaN where the law has none
+};
+
+/// The module of a law; dtype is float32 or float64. Throws Error where the weights or the codes do
+/// not fit.
+torch::jit::Module script_law(const kernels::LearnedLawWeights& weights, torch::Dtype dtype,
+                              const ScriptCodes& codes = {});
 
 /// Writes `<file>.tmp` and renames it.
 void save_script_law(const std::filesystem::path& file, const kernels::LearnedLawWeights& weights,
-                     torch::Dtype dtype);
+                     torch::Dtype dtype, const ScriptCodes& codes = {});
 
 /// A loaded law whose attributes, methods and buffers were checked.
 struct ScriptLaw {
@@ -46,6 +80,8 @@ struct ScriptLaw {
   torch::Tensor project(const torch::Tensor& F, const torch::Tensor& z) const;
   torch::Tensor stress(const torch::Tensor& F_proj, const torch::Tensor& C,
                        const torch::Tensor& z) const;
+  torch::Tensor code_of(const std::string& material) const;
+  std::vector<std::string> materials() const;
 };
 
 /// Throws Error naming the file and what differs (no such file, not a TorchScript archive, damaged,

@@ -4,16 +4,19 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/wait.h>
 #include <torch/torch.h>
 
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <limits>
 
 #include "models/script_check.hpp"
 #include "ops/kernels/base/error.hpp"
 #include "ops/learned/learned_law.hpp"
+#include "tests/support/caps.hpp"
 #include "tests/support/random_weights.hpp"
 
 namespace uniphy::models {
@@ -145,6 +148,65 @@ TEST_P(ScriptLawCase, RunsWhereNoneOfThisProjectIsLinked) {
   EXPECT_NE(run(), 0);
 }
 
+/// Three training codes.
+ScriptCodes some_codes(int latent_size) {
+  const double none = std::numeric_limits<double>::quiet_NaN();
+  ScriptCodes codes;
+  codes.materials = {"elastic", "sand", "elastic"};
+  for (int k = 0; k < 3 * latent_size; ++k) codes.z.push_back(0.1 * k - 0.7);
+  codes.parameters = {
+      {1e5, 2e5, none, none, none}, {3e5, 4e5, none, 0.5, none}, {5e5, 6e5, none, none, none}};
+  return codes;
+}
+
+TEST_P(ScriptLawCase, CarriesTheTrainingCodes) {
+  const auto w = weights();
+  const ScriptCodes codes = some_codes(w.latent_size);
+  save_script_law(file("law.pt"), w, GetParam().dtype, codes);
+  const ScriptLaw law = load_script_law(file("law.pt"));
+  EXPECT_EQ(law.materials(), codes.materials);
+  const auto row = [&](int i) {
+    const auto begin = codes.z.begin() + i * w.latent_size;
+    return torch::tensor(std::vector<double>(begin, begin + w.latent_size), torch::kFloat64)
+        .to(GetParam().dtype);
+  };
+  EXPECT_TRUE(torch::equal(law.code_of("elastic"), row(0)));
+  EXPECT_TRUE(torch::equal(law.code_of("sand"), row(1)));
+  EXPECT_TRUE(torch::equal(law.module.attr("codes").toTensor()[2], row(2)));
+  const Tensor parameters = law.module.attr("material_parameters").toTensor();
+  EXPECT_EQ(parameters[1][1].item<double>(), 4e5);
+  EXPECT_TRUE(parameters[1][2].isnan().item<bool>());
+  // A code of the file is an argument of its methods.
+  const Tensor F = torch::eye(3).unsqueeze(0);
+  EXPECT_EQ(law.project(F, law.code_of("sand")).sizes(), F.sizes());
+  try {
+    law.code_of("cheese");
+    FAIL() << "no error";
+  } catch (const std::exception& e) {
+    EXPECT_THAT(e.what(),
+                HasSubstr("uniphy law: material: expected one of elastic, sand, found cheese"));
+  }
+}
+
+/// As a user in Python does it, and the methods' files in plain PyTorch on the same numbers.
+TEST_P(ScriptLawCase, RunsInPython) {
+  if (GetParam().dtype != torch::kFloat64) GTEST_SKIP() << "float64 alone is precise enough";
+  // Differentiable at rest.
+  auto w = weights();
+  if (w.form == LawForm::isotropic) w = testing::with_caps(w, 1.5, 3);
+  save_script_law(file("law.pt"), w, GetParam().dtype, some_codes(w.latent_size));
+  const std::string command =
+      std::string("PYTHONDONTWRITEBYTECODE=1 " UNIPHY_PYTHON " " UNIPHY_SOURCE_DIR) +
+      "/tests/models/torchscript_python.py " + file("law.pt").string() +
+      " " UNIPHY_SOURCE_DIR "/models/script";
+  const int status = std::system(command.c_str());
+  ASSERT_TRUE(WIFEXITED(status));
+  // 127: no such program.
+  if (WEXITSTATUS(status) == 77 || WEXITSTATUS(status) == 127)
+    GTEST_SKIP() << "no torch in " UNIPHY_PYTHON " (Debian: python3-torch)";
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+}
+
 INSTANTIATE_TEST_SUITE_P(
     All, ScriptLawCase,
     ::testing::Values(
@@ -191,8 +253,8 @@ TEST_F(ScriptLawErrors, AnUnchangedLawIsAccepted) {
 TEST_F(ScriptLawErrors, WrongAttributes) {
   EXPECT_EQ(after([](auto& m) { m.setattr("format", std::string("other")); }),
             prefix() + "attribute format: expected \"uniphy-torchscript-law\", found \"other\"");
-  EXPECT_EQ(after([](auto& m) { m.setattr("version", 2); }),
-            prefix() + "attribute version: expected 1, found 2");
+  EXPECT_EQ(after([](auto& m) { m.setattr("version", 1); }),
+            prefix() + "attribute version: expected 2, found 1; export the model again");
   EXPECT_EQ(after([](auto& m) { m.setattr("units", std::string("tau: kPa")); }),
             prefix() +
                 "attribute units: expected \"F: 1, C: 1/s, z: 1, tau: Pa\", found \"tau: "
@@ -211,6 +273,30 @@ TEST_F(ScriptLawErrors, WrongAttributes) {
             prefix() +
                 "buffer projection_weight_0: expected [n, 33] and a bias of [n], found [8, "
                 "6] and a bias of [8]");
+}
+
+TEST_F(ScriptLawErrors, WrongCodes) {
+  ScriptCodes short_of_z = some_codes(3);
+  short_of_z.z.pop_back();
+  EXPECT_EQ(message_of([&] { script_law(small(), torch::kFloat64, short_of_z); }),
+            "TorchScript law: codes: expected [3, 3] numbers and parameters of 3 codes, found 8 "
+            "and 3");
+  EXPECT_EQ(after([](auto& m) {
+              m.setattr("codes", torch::zeros({2, 4}, torch::kFloat64));
+            }),
+            prefix() + "buffer codes: expected [N, 3], found [2, 4]");
+  EXPECT_EQ(after([](auto& m) {
+              m.setattr("codes", torch::zeros({2, 3}, torch::kFloat64));
+            }),
+            prefix() + "attribute materials: expected 2 strings, found 0");
+  EXPECT_EQ(after([](auto& m) {
+              m.setattr("codes", torch::zeros({2, 3}));
+            }),
+            prefix() + "buffer codes: expected dtype float64, found float32");
+  EXPECT_EQ(after([](auto& m) {
+              m.setattr("material_parameters", torch::zeros({1, 5}, torch::kFloat64));
+            }),
+            prefix() + "buffer material_parameters: expected [0, 5], found [1, 5]");
 }
 
 TEST_F(ScriptLawErrors, AnotherPrecisionThanAskedFor) {
@@ -234,6 +320,8 @@ TEST_F(ScriptLawErrors, ALawWithoutItsMethods) {
     bare.register_attribute(name, c10::StringType::get(), whole.attr(name));
   for (const char* name : {"version", "latent_size"})
     bare.register_attribute(name, c10::IntType::get(), whole.attr(name));
+  for (const char* name : {"materials", "parameter_names", "parameter_units"})
+    bare.register_attribute(name, whole.type()->findAttribute(name), whole.attr(name));
   for (const auto& buffer : whole.named_buffers()) bare.register_buffer(buffer.name, buffer.value);
   bare.define("def project(self, F: Tensor, z: Tensor) -> Tensor:\n    return F\n");
   bare.save(file("law.pt").string());
@@ -292,6 +380,27 @@ TEST_F(ScriptLawErrors, WrongArgumentsNameThemselves) {
               HasSubstr("uniphy law: z: expected [3] or [2, 3], found [4]"));
   EXPECT_THAT(message([&] { law.stress(F, F.slice(0, 1), torch::zeros(3)); }),
               HasSubstr("uniphy law: C: expected [2, 3, 3], found [1, 3, 3]"));
+  // Numbers that are none, or that no answer would fit.
+  const Tensor z = torch::zeros(3), nan = F * std::numeric_limits<double>::quiet_NaN();
+  const std::string finite = "expected finite numbers, found NaN or infinity";
+  const std::string floats = "expected float32 or float64, found ";
+  for (const auto& [x, text] :
+       {std::pair(nan, finite), std::pair(F / 0, finite),
+        std::pair(F.to(torch::kInt64), floats + "integers or truth values of 64 bits"),
+        std::pair(F.to(torch::kHalf), floats + "floating-point numbers of 16 bits"),
+        std::pair(F.to(torch::kBFloat16), floats + "floating-point numbers of 16 bits"),
+        std::pair(F.to(torch::kComplexDouble), floats + "complex numbers of 128 bits")}) {
+    EXPECT_THAT(message([&] { law.project(x, z); }), HasSubstr("uniphy law: F: " + text));
+    EXPECT_THAT(message([&] { law.stress(x, F, z); }), HasSubstr("uniphy law: F_proj: " + text));
+    EXPECT_THAT(message([&] { law.stress(F, x, z); }), HasSubstr("uniphy law: C: " + text));
+    const Tensor of_x = x.select(0, 0).select(0, 0);
+    EXPECT_THAT(message([&] { law.project(F, of_x); }), HasSubstr("uniphy law: z: " + text));
+    EXPECT_THAT(message([&] { law.stress(F, F, of_x); }), HasSubstr("uniphy law: z: " + text));
+  }
+  // Finite, but not in the law's own precision.
+  const ScriptLaw single{script_law(w, torch::kFloat32), w.form, w.latent_size, torch::kFloat32};
+  EXPECT_THAT(message([&] { single.project(F.to(torch::kFloat64) * 1e300, z); }),
+              HasSubstr("uniphy law: F: " + finite));
 }
 
 }  // namespace

@@ -4,7 +4,8 @@
 #include "ops/kernels/simd/lanes.hpp"
 
 // The activations of the learned networks, one particle a lane. They are a third of the time of a
-// narrow network, so their exponential does without the checks of a general one.
+// narrow network, so their exponential does without the checks of a general one. The coefficients:
+// activation_polynomials.py, which yields those of least largest error and holds these to it.
 
 namespace uniphy::kernels {
 inline namespace UNIPHY_ISA {
