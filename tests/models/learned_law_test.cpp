@@ -78,7 +78,7 @@ TEST_P(LearnedLawModule, IsTheLawOfTheReference) {
 }
 
 /// Along a random direction of each parameter, against central differences.
-TEST_P(LearnedLawModule, DISABLED_GradientsReachEveryWeight) {
+TEST_P(LearnedLawModule, GradientsReachEveryWeight) {
   const LearnedLaw law = wide_law(options(GetParam()));
   const Probe probe = probe_states(30, 4);
   // In the isotropic form soft enough that the caps cut.

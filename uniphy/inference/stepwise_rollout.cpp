@@ -31,11 +31,11 @@ ops::LawOutput law_of(const ops::RolloutBody& body, const Tensor& F, const Tenso
   const Tensor z =
       (body.parameters.defined() ? body.parameters : torch::tensor(body.law.z, torch::kFloat64))
           .to(F.dtype());
-  const auto law = [&](const auto& networks) -> ops::LawOutput {
-    const Tensor F_proj = ops::learned_project(networks, F, z);  // lines 7-9: SVD, Δ = g(F), F + Δ
-    return {F_proj, ops::learned_stress(networks, F_proj, C, z)};  // lines 10-12: SVD, R, f, Ŝ
-  };
-  return body.networks.defined() ? law(body.networks) : law(body.law.weights);
+  const ops::LearnedNetworks networks = body.networks.defined()
+                                            ? body.networks
+                                            : ops::to_networks(*body.law.weights, torch::kFloat64);
+  const Tensor F_proj = ops::learned_project(networks, F, z);  // lines 7-9: SVD, Δ = g(F), F + Δ
+  return {F_proj, ops::learned_stress(networks, F_proj, C, z)};  // lines 10-12: SVD, R, f, Ŝ
 }
 
 }  // namespace

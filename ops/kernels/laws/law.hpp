@@ -49,7 +49,7 @@ class LawKernel {
   /// grad_F_trial may be the same memory as grad_F_proj.
   virtual void adjoint(std::ptrdiff_t count, T dt, View<const T> F_trial, View<const T> C,
                        View<const T> grad_F_proj, View<const T> grad_tau, View<T> grad_F_trial,
-                       View<T> grad_C, T* accumulator, T* weight_sums) const = 0;
+                       View<T> grad_C, T* accumulator, T* weight_sums = nullptr) const = 0;
 };
 
 enum class LawId {
