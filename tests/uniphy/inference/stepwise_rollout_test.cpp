@@ -35,6 +35,11 @@ struct Differentiated {
     }
     leaves = {scene.x, scene.v, scene.C, scene.F, body.parameters};
     names = {"x", "v", "C", "F", "parameters"};
+    if (body.networks.defined()) {
+      leaves.push_back(body.networks.projection.numbers);
+      leaves.push_back(body.networks.stress.numbers);
+      names.insert(names.end(), {"weights of the projection", "weights of the stress"});
+    }
     for (Tensor& leaf : leaves) leaf.requires_grad_();
     frames = (stepwise ? stepwise_rollout : ops::rollout)(
         scene.x, scene.v, scene.C, scene.F, scene.mass, scene.volume, {body}, scene.settings);
