@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "models/trained_model.hpp"
 #include "ops/kernels/base/error.hpp"
 #include "ops/kernels/laws/law_parameters.hpp"
 #include "uniphy/data/material_ranges.hpp"
@@ -20,13 +21,13 @@ torch::Tensor to_tensor(const std::vector<double>& numbers) {
 
 class LatentFitVariables : public FitVariables {
  public:
-  explicit LatentFitVariables(const ModelFile& model)
-      : weights_(std::make_shared<kernels::LearnedLawWeights>(model.weights)),
-        networks_(ops::to_networks(model.weights, torch::kFloat64)),
-        materials_(model.materials) {
-    const auto codes = static_cast<int>(model.codes());
+  explicit LatentFitVariables(const ModelFile& file) {
+    const models::TrainedModel model = models::trained_model(file, torch::kFloat64);
+    law_ = model.law->frozen();
+    materials_ = model.codes->materials();
+    const auto codes = static_cast<int>(materials_.size());
     if (codes == 0) throw Error("model: expected latent codes to start from, found none");
-    const torch::Tensor z = to_tensor(model.latents).view({codes, size()});
+    const torch::Tensor z = model.codes->z.detach();
     mean_ = z.mean(0);
     const torch::Tensor spread = z.std(0, /*unbiased=*/false);
     spread_ = torch::where(spread > 0, spread, torch::ones_like(spread));
@@ -37,13 +38,13 @@ class LatentFitVariables : public FitVariables {
     }
   }
 
-  int size() const override { return weights_->latent_size; }
+  int size() const override { return static_cast<int>(law_->latent_size()); }
 
   ops::RolloutBody body(const torch::Tensor& u, std::ptrdiff_t particles) const override {
     kernels::LawDescription law;
     law.id = kernels::LawId::learned;
-    law.weights = weights_;
-    return {0, particles, law, code(u), networks_};
+    law.weights = ops::kernel_weights(law_->networks());
+    return {0, particles, law, code(u), law_->networks()};
   }
 
   torch::Tensor prior(const torch::Tensor& u) const override { return code(u).square().sum(); }
@@ -55,8 +56,7 @@ class LatentFitVariables : public FitVariables {
  private:
   torch::Tensor code(const torch::Tensor& u) const { return mean_ + spread_ * u; }
 
-  std::shared_ptr<const kernels::LearnedLawWeights> weights_;
-  ops::LearnedNetworks networks_;
+  models::LearnedLaw law_{nullptr};  // frozen
   std::vector<std::string> materials_;
   torch::Tensor mean_, spread_;  // [latent size]
   std::vector<std::vector<double>> starts_;
