@@ -2,16 +2,13 @@
 
 #include <torch/torch.h>
 
-#include <cerrno>
-#include <cstring>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
-#include <system_error>
 
 #include "models/torchscript_names.hpp"
 #include "models/torchscript_source.hpp"
 #include "ops/kernels/base/error.hpp"
+#include "uniphy/io/atomic_file.hpp"
 
 namespace uniphy::models {
 
@@ -118,19 +115,7 @@ void save_script_law(const fs::path& file, const kernels::LearnedLawWeights& wei
   // To memory first: LibTorch's own file writer ends the program where the disk is full.
   std::ostringstream bytes;
   module.save(bytes, {{"metadata.json", metadata.dump(2)}});
-  const fs::path temporary = file.string() + ".tmp";
-  std::error_code error;
-  errno = 0;
-  std::ofstream stream(temporary, std::ios::binary | std::ios::trunc);
-  stream << bytes.str();
-  stream.close();
-  if (!stream) {
-    const std::string reason = std::strerror(errno);
-    fs::remove(temporary, error);
-    throw Error(file.string() + ": cannot write: " + reason);
-  }
-  fs::rename(temporary, file, error);
-  if (error) throw Error(file.string() + ": cannot write: " + error.message());
+  write_text_file(file, bytes.str());
 }
 
 }  // namespace uniphy::models

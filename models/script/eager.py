@@ -28,7 +28,7 @@ class Eager(torch.nn.Module):
     EXPONENT_LIMIT: float
     ARGUMENT_LIMIT: float
     FLUID_CAP: float
-    MINIMUM_STRETCH: float  # ops/kernels/spectral/minimum_stretch.hpp
+    MINIMUM_STRETCH: float  # ops/kernels/spectral/limits.hpp
     FACTOR_FLOOR: float  # ops/kernels/spectral/svd3.hpp, svd3_adjoint
     EPSILON: float  # of the law's dtype
     TINY: float  # its least normal number
