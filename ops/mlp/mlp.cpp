@@ -11,7 +11,6 @@
 #include "ops/kernels/learned/learned_law_table.hpp"
 #include "ops/kernels/simd/aligned_buffer.hpp"
 #include "ops/mlp/mlp_problem.hpp"
-#include "ops/mlp/weight_sums.hpp"
 
 namespace uniphy::ops {
 namespace {
@@ -110,7 +109,7 @@ torch::Tensor forward(const MlpProblem<T>& problem, const torch::Tensor& feature
   const std::int64_t plane = std::int64_t(net.max_width) * kTile;
 #pragma omp parallel
   {
-    FoldedMlp<T> folded(problem);
+    MlpOfCode<T> folded(problem);
     kernels::AlignedBuffer<T> buffer(plane + net.forward_scratch());
     T *in = buffer.data(), *scratch = in + plane;
 #pragma omp for schedule(static)
@@ -134,10 +133,10 @@ variable_list backward(const MlpProblem<T>& problem, const torch::Tensor& featur
   const std::int64_t latent = problem.latent, n_in = net.in();
   const std::int64_t plane = std::int64_t(net.max_width) * kTile;
   const std::int64_t sums = want_weights ? std::min(kSums, tiles) : kSums;
-  const WeightSums<T> layout(net);
+  const std::int64_t sums_size = net.weight_sums();
   torch::Tensor grad_features, grad_z, grad_flat;
   if (want_features) grad_features = like_samples(features, n_in);
-  kernels::AlignedBuffer<T> partial(want_weights ? sums * layout.size() : 0);
+  kernels::AlignedBuffer<T> partial(want_weights ? sums * sums_size : 0);
   partial.fill(T(0));
   const bool want_bias = latent > 0 && (want_z || want_weights);
   std::vector<T> first_bias(want_bias ? std::size_t(tiles * width) : 0, T(0));
@@ -146,14 +145,13 @@ variable_list backward(const MlpProblem<T>& problem, const torch::Tensor& featur
   const T* codes = z.data_ptr<T>();
 #pragma omp parallel
   {
-    FoldedMlp<T> folded(problem);
+    MlpOfCode<T> folded(problem);
     kernels::AlignedBuffer<T> scratch(3 * plane + net.tape_scratch());
     T *in = scratch.data(), *grad_out = in + plane, *grad_in = grad_out + plane,
       *tape = grad_in + plane;
-    std::vector<kernels::WeightGradient<T>> weights;
 #pragma omp for schedule(static)
     for (std::int64_t sum = 0; sum < sums; ++sum) {
-      if (want_weights) weights = layout.in(partial.data() + sum * layout.size());
+      T* const weights = want_weights ? partial.data() + sum * sums_size : nullptr;
       for (std::int64_t t = sum * tiles / sums; t < (sum + 1) * tiles / sums; ++t) {
         const auto& of_code = folded.of_code(codes + problem.code(t) * latent);
         to_tile(problem, from, t, n_in, in);
@@ -161,7 +159,7 @@ variable_list backward(const MlpProblem<T>& problem, const torch::Tensor& featur
         table.mlp_tape(of_code, in, tape);
         table.mlp_backward(of_code, in, tape, grad_out, want_features ? grad_in : nullptr,
                            want_bias ? first_bias.data() + t * width : nullptr,
-                           want_weights ? weights.data() : nullptr);
+                           weights);
         if (want_features) from_tile(problem, grad_in, t, n_in, to_features);
       }
     }
@@ -191,7 +189,7 @@ variable_list backward(const MlpProblem<T>& problem, const torch::Tensor& featur
         for (std::int64_t k = 0; k < latent; ++k)
           to[o * problem.in() + n_in + k] += bias_of(i)[o] * codes[i * latent + k];
     for (std::int64_t sum = 0; sum < sums; ++sum)
-      layout.add(layout.in(partial.data() + sum * layout.size()), latent, to);
+      problem.packed().add_weight_gradient(partial.data() + sum * sums_size, to);
   }
   return {grad_features, grad_z, grad_flat};
 }

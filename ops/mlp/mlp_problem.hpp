@@ -29,8 +29,9 @@ class MlpProblem {
         latent(latent),
         tiles_per_code((per_code + kTile - 1) / kTile),
         weight(flat),
-        packed_(weights(widths), activation, std::vector<double>(std::size_t(latent), 0.0)) {}
+        packed_(weights(widths), activation, int(latent)) {}
 
+  const kernels::PackedMlpStorage<T>& packed() const { return packed_; }
   const kernels::PackedMlp<T>& net() const { return packed_.mlp(); }
   std::int64_t tiles() const { return codes * tiles_per_code; }
   std::int64_t first_width() const { return net().layer[0].out; }
@@ -67,9 +68,9 @@ class MlpProblem {
 
 /// A thread's own network, whose first bias is that of one code.
 template <class T>
-class FoldedMlp {
+class MlpOfCode {
  public:
-  explicit FoldedMlp(const MlpProblem<T>& problem)
+  explicit MlpOfCode(const MlpProblem<T>& problem)
       : problem_(problem),
         layers_(problem.net().layer, problem.net().layer + problem.net().depth),
         bias_(layers_[0].bias, layers_[0].bias + kernels::padded(layers_[0].out)),

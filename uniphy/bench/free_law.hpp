@@ -31,7 +31,7 @@ class FreeLaw : public kernels::LawKernel<T> {
 
   void adjoint(std::ptrdiff_t count, T, kernels::View<const T>, kernels::View<const T>,
                kernels::View<const T> grad_F_proj, kernels::View<const T> grad_tau,
-               kernels::View<T> grad_F_trial, kernels::View<T>, T*) const override {
+               kernels::View<T> grad_F_trial, kernels::View<T>, T*, T*) const override {
     for (int k = 0; k < 9; ++k) {
       for (std::ptrdiff_t p = 0; p < count; ++p) {
         grad_F_trial(p, k) = grad_F_proj(p, k) + kStiffness * grad_tau(p, k);

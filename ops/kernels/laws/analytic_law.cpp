@@ -44,7 +44,7 @@ class AnalyticLaw final : public LawKernel<T> {
   }
   void adjoint(std::ptrdiff_t count, T dt, View<const T> F_trial, View<const T> C,
                View<const T> grad_F_proj, View<const T> grad_tau, View<T> grad_F_trial,
-               View<T> grad_C, T* accumulator) const override {
+               View<T> grad_C, T* accumulator, T*) const override {
     LawParameters<T> sum;
     law_.adjoint(count, parameters_, dt, F_trial, C, grad_F_proj, grad_tau, grad_F_trial, grad_C,
                  accumulator ? &sum : nullptr);

@@ -31,6 +31,13 @@ LawId law_id(const std::string& name) {
 }
 
 template <class T>
+void LawKernel<T>::weight_gradient(const T*, const T*, T*) const {
+  throw Error("law: expected one with networks, found one that has no weights");
+}
+template class LawKernel<float>;
+template class LawKernel<double>;
+
+template <class T>
 std::shared_ptr<const LawKernel<T>> make_law(const LawDescription& description) {
   if (description.id == LawId::learned) return make_learned_law<T>(description);
   return make_analytic_law<T>(description);

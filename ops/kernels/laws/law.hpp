@@ -30,16 +30,26 @@ class LawKernel {
   /// Turns a summed accumulator into dL/d(parameters); `gradient` has parameter_size() numbers.
   virtual void parameter_gradient(const T* accumulator, T* gradient) const = 0;
 
+  /// Weights and biases of the networks of a learned law, which it can be differentiated by as
+  /// well: the projection's, then the stress's, each flat (PackedMlpStorage::add_weight_gradient).
+  /// 0 of other laws.
+  virtual std::ptrdiff_t weight_size() const { return 0; }
+  /// Length of the running sum of the weights, a multiple of 16.
+  virtual std::ptrdiff_t weight_sums_size() const { return 0; }
+  /// Turns both summed sums into dL/d(weights); `gradient` has weight_size() numbers.
+  virtual void weight_gradient(const T* accumulator, const T* weight_sums, T* gradient) const;
+
   /// F_trial, C [count, 9] → F_proj, tau [count, 9]; dt in s, C in 1/s, tau in Pa. F_proj may be
   /// the same memory as F_trial.
   virtual void evaluate(std::ptrdiff_t count, T dt, View<const T> F_trial, View<const T> C,
                         View<T> F_proj, View<T> tau) const = 0;
 
-  /// The adjoint of evaluate: given dL/dF_proj and dL/dtau, overwrites grad_F_trial, adds to grad_C
-  /// and to accumulator (both may be null). grad_F_trial may be the same memory as grad_F_proj.
+  /// The adjoint of evaluate: given dL/dF_proj and dL/dtau, overwrites grad_F_trial, adds to grad_C,
+  /// to accumulator and to weight_sums (all three may be null; weight_sums aligned to 64 bytes).
+  /// grad_F_trial may be the same memory as grad_F_proj.
   virtual void adjoint(std::ptrdiff_t count, T dt, View<const T> F_trial, View<const T> C,
                        View<const T> grad_F_proj, View<const T> grad_tau, View<T> grad_F_trial,
-                       View<T> grad_C, T* accumulator) const = 0;
+                       View<T> grad_C, T* accumulator, T* weight_sums) const = 0;
 };
 
 enum class LawId {

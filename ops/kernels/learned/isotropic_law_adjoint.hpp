@@ -7,30 +7,50 @@
 namespace uniphy::kernels {
 inline namespace UNIPHY_ISA {
 
+/// Where network_backward adds gradients; each may be null.
+template <class T>
+struct NetworkSums {
+  T* first_bias;  ///< of the folded first bias
+  T* outputs;     ///< of the outputs of a network that answers to z alone
+  T* weights;     ///< PackedMlp::weight_sums
+  T* features;    ///< [out, in], outputs × features of a network that answers to z alone
+};
+
 /// The adjoint of network(). One that answers to z alone has the gradient of its outputs added to
-/// `sums` (may be null) instead, and none of its features.
+/// sums.outputs and sums.features instead, and none of its features.
 template <class T>
 void network_backward(const PackedMlp<T>& net, const T* constant, const T* in, T* tape,
-                      const T* grad_out, T* grad_in, T* first_bias, T* sums) {
+                      const T* grad_out, T* grad_in, const NetworkSums<T>& sums) {
   using V = Lanes<T>;
-  if (!constant) return mlp_backward<T>(net, in, tape, grad_out, grad_in, first_bias, nullptr);
+  constexpr std::ptrdiff_t w = width_of<V>;
+  if (!constant)
+    return mlp_backward<T>(net, in, tape, grad_out, grad_in, sums.first_bias, sums.weights);
   std::fill_n(grad_in, net.in() * kTile, T(0));
-  if (!sums) return;
-  for (int o = 0; o < net.out(); ++o) {
+  for (int o = 0; sums.outputs && o < net.out(); ++o) {
     V sum(T(0));
-    for (std::ptrdiff_t l = 0; l < kTile; l += width_of<V>)
+    for (std::ptrdiff_t l = 0; l < kTile; l += w)
       sum = sum + V::load_aligned(grad_out + o * kTile + l);
-    sums[o] += lane_sum(sum);
+    sums.outputs[o] += lane_sum(sum);
+  }
+  for (int o = 0; sums.features && o < net.out(); ++o) {
+    for (int i = 0; i < net.in(); ++i) {
+      V sum(T(0));
+      for (std::ptrdiff_t l = 0; l < kTile; l += w)
+        sum = lane_fma(V::load_aligned(grad_out + o * kTile + l),
+                       V::load_aligned(in + i * kTile + l), sum);
+      sums.features[o * net.in() + i] += lane_sum(sum);
+    }
   }
 }
 
 /// The adjoint of isotropic_evaluate, recomputing its forward pass tile by tile. Overwrites
-/// grad_F_trial, adds to grad_C and to the accumulator (laid out as LearnedLaw says); the last
-/// two may be null.
+/// grad_F_trial, adds to grad_C, to the accumulator and to weight_sums (laid out as LearnedLaw
+/// says); the last three may be null.
 template <class T>
 inline void isotropic_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, View<const T> F_trial,
                               View<const T> C, View<const T> grad_F_proj, View<const T> grad_tau,
-                              View<T> grad_F_trial, View<T> grad_C, T* accumulator, T* scratch) {
+                              View<T> grad_F_trial, View<T> grad_C, T* accumulator, T* weight_sums,
+                              T* scratch) {
   using V = Lanes<T>;
   using namespace isotropic_detail;
   constexpr int w = width_of<V>;
@@ -72,11 +92,12 @@ inline void isotropic_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, Vi
     sum_log_e = sum_log_e + of.log_e;
     sum_log_s = sum_log_s + of.log_s;
   }
-  T* const stress_bias = accumulator ? accumulator + law.projection.layer[0].out : nullptr;
+  const auto in = [](T* sums, std::ptrdiff_t at) { return sums ? sums + at : nullptr; };
   T* const feature = tile.grad_features;
-  network_backward(law.stress, law.constant_stress, tile.stress_in, tile.stress_tape,
-                   tile.grad_stress, feature, stress_bias,
-                   accumulator ? accumulator + law.coefficient_sums() : nullptr);
+  network_backward<T>(
+      law.stress, law.constant_stress, tile.stress_in, tile.stress_tape, tile.grad_stress, feature,
+      {in(accumulator, law.projection.layer[0].out), in(accumulator, law.coefficient_sums()),
+       in(weight_sums, law.stress_weight_sums()), in(weight_sums, law.stress_feature_sums())});
 
   // From the stress to the frame gradient of the projected F, and on to the gate.
   for (std::ptrdiff_t l = 0; l < kTile; l += w) {
@@ -173,9 +194,10 @@ inline void isotropic_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, Vi
   }
 
   T* const invariant = tile.grad_invariants;
-  network_backward(law.projection, law.constant_projection, tile.projection_in,
-                   tile.projection_tape, tile.grad_projection, invariant, accumulator,
-                   accumulator ? accumulator + law.cap_sums() : nullptr);
+  network_backward<T>(law.projection, law.constant_projection, tile.projection_in,
+                      tile.projection_tape, tile.grad_projection, invariant,
+                      {accumulator, in(accumulator, law.cap_sums()), weight_sums,
+                       in(weight_sums, law.projection_feature_sums())});
   for (std::ptrdiff_t l = 0; l < kTile; l += w) {
     const Mat3<V> U = load_plane3<V>(tile.U, l), Vm = load_plane3<V>(tile.V, l);
     Vec3<V> sigma;

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "ops/kernels/base/error.hpp"
+#include "ops/kernels/learned/packed_networks.hpp"
 #include "ops/kernels/simd/aligned_buffer.hpp"
 
 namespace uniphy::kernels {
@@ -68,8 +69,9 @@ class LearnedLawKernel final : public LawKernel<T> {
   explicit LearnedLawKernel(const LawDescription& d)
       : latent_size_(d.weights->latent_size),
         table_(learned_law_table<T>()),
-        projection_(d.weights->projection, d.weights->activation, d.z),
-        stress_(d.weights->stress, d.weights->activation, d.z) {
+        packed_(d.weights->packed<T>()),
+        projection_({packed_, &packed_->projection}, d.z),
+        stress_({packed_, &packed_->stress}, d.z) {
     const double z0 = latent_size_ > 0 ? d.z[0] : 0, z1 = latent_size_ > 1 ? d.z[1] : 0;
     law_ = {d.weights->form,
             projection_.mlp(),
@@ -81,15 +83,13 @@ class LearnedLawKernel final : public LawKernel<T> {
             nullptr,
             nullptr};
     if (law_.form == LawForm::isotropic) {
-      const NetworkShape shape = network_shape(law_.form);
       rest_projection_ = at_rest(law_.projection);
       rest_stress_ = at_rest(law_.stress);
       law_.rest_cap = std::min(rest_projection_[kTile], T(0));
       law_.rest_pressure = rest_stress_[kTile];
-      if (ignores_state(d.weights->projection, shape.projection_in))
+      if (packed_->projection_ignores_state)
         law_.constant_projection = rest_projection_.data();
-      if (ignores_state(d.weights->stress, shape.stress_in))
-        law_.constant_stress = rest_stress_.data();
+      if (packed_->stress_ignores_state) law_.constant_stress = rest_stress_.data();
     }
   }
 
@@ -101,24 +101,41 @@ class LearnedLawKernel final : public LawKernel<T> {
     const int stress_width = law_.stress.layer[0].out;
     const T* tail = accumulator + law_.scale_sums();
     std::vector<double> z(latent_size_, 0.0);
-    projection_.add_latent_gradient(accumulator, z);
-    stress_.add_latent_gradient(accumulator + projection_width, z);
+    projection_.packed().add_latent_gradient(accumulator, z);
+    stress_.packed().add_latent_gradient(accumulator + projection_width, z);
     if (law_.form == LawForm::isotropic) {
-      std::vector<T> outputs(accumulator + law_.coefficient_sums(),
-                             accumulator + law_.accumulator_size());
-      outputs[1] += tail[2];
       std::vector<T> bias(stress_width, T(0));
-      at_rest(law_.stress, outputs.data(), bias.data());
-      stress_.add_latent_gradient(bias.data(), z);
-      outputs.assign(accumulator + law_.cap_sums(), accumulator + law_.coefficient_sums());
-      if (law_.rest_cap < 0) outputs[1] += tail[3];
+      at_rest(law_.stress, stress_outputs(accumulator).data(), bias.data(), nullptr);
+      stress_.packed().add_latent_gradient(bias.data(), z);
       bias.assign(projection_width, T(0));
-      at_rest(law_.projection, outputs.data(), bias.data());
-      projection_.add_latent_gradient(bias.data(), z);
+      at_rest(law_.projection, projection_outputs(accumulator).data(), bias.data(), nullptr);
+      projection_.packed().add_latent_gradient(bias.data(), z);
       if (latent_size_ > 1) z[1] += kStrainRate * double(tail[1]);
     }
     if (latent_size_ > 0) z[0] += kStressRate * double(tail[0]);
     std::copy(z.begin(), z.end(), gradient);
+  }
+
+  std::ptrdiff_t weight_size() const override {
+    return projection_.packed().weight_size() + stress_.packed().weight_size();
+  }
+  std::ptrdiff_t weight_sums_size() const override { return law_.weight_sums_size(); }
+
+  void weight_gradient(const T* accumulator, const T* weight_sums, T* gradient) const override {
+    AlignedBuffer<T> sums(law_.weight_sums_size());
+    std::copy_n(weight_sums, sums.size(), sums.data());
+    T *of_projection = sums.data(), *of_stress = of_projection + law_.stress_weight_sums();
+    if (law_.form == LawForm::isotropic) {
+      at_rest(law_.projection, projection_outputs(accumulator).data(), nullptr, of_projection);
+      at_rest(law_.stress, stress_outputs(accumulator).data(), nullptr, of_stress);
+      if (law_.constant_projection)
+        add_features(law_.projection, weight_sums + law_.projection_feature_sums(), of_projection);
+      if (law_.constant_stress)
+        add_features(law_.stress, weight_sums + law_.stress_feature_sums(), of_stress);
+    }
+    std::fill_n(gradient, weight_size(), T(0));
+    projection_.add_weight_gradient(of_projection, gradient);
+    stress_.add_weight_gradient(of_stress, gradient + projection_.packed().weight_size());
   }
 
   void evaluate(std::ptrdiff_t count, T, View<const T> F_trial, View<const T> C, View<T> F_proj,
@@ -139,7 +156,7 @@ class LearnedLawKernel final : public LawKernel<T> {
 
   void adjoint(std::ptrdiff_t count, T, View<const T> F_trial, View<const T> C,
                View<const T> grad_F_proj, View<const T> grad_tau, View<T> grad_F_trial,
-               View<T> grad_C, T* accumulator) const override {
+               View<T> grad_C, T* accumulator, T* weight_sums) const override {
     T* planes = scratch_of_thread<T>(6 * kPlanesOfTile + table_.scratch(law_));
     T* scratch = planes + 6 * kPlanesOfTile;
     for (std::ptrdiff_t p = 0; p < count; p += kTile) {
@@ -150,7 +167,7 @@ class LearnedLawKernel final : public LawKernel<T> {
       table_.adjoint(law_, n, planes_of<T>(F_trial.from(p), n, of(0)),
                      planes_of<T>(C.from(p), n, of(1)), planes_of<T>(grad_F_proj.from(p), n, of(2)),
                      planes_of<T>(grad_tau.from(p), n, of(3)), F_out.view(), C_out.view(),
-                     accumulator, scratch);
+                     accumulator, weight_sums, scratch);
       F_out.finish(n);
       C_out.finish(n);
     }
@@ -158,29 +175,57 @@ class LearnedLawKernel final : public LawKernel<T> {
 
  private:
   /// The outputs of a network at rest, [out, kTile], from the very kernel that the roll-out uses,
-  /// so that what is taken off is exact there. With `bias`, the gradient of the folded first bias
-  /// is added, given that of the outputs, `weight`.
-  AlignedBuffer<T> at_rest(const PackedMlp<T>& net, const T* weight = nullptr,
-                           T* bias = nullptr) const {
+  /// so that what is taken off is exact there.
+  AlignedBuffer<T> at_rest(const PackedMlp<T>& net) const {
     const std::ptrdiff_t plane = std::ptrdiff_t(net.max_width) * kTile;
-    T* scratch =
-        scratch_of_thread<T>(std::max(net.forward_scratch(), net.tape_scratch()) + 2 * plane);
-    T *in = scratch, *grad = in + plane, *tape = grad + plane;
-    std::fill_n(in, 2 * plane, T(0));
+    T* in = scratch_of_thread<T>(net.forward_scratch() + plane);
+    std::fill_n(in, plane, T(0));
     AlignedBuffer<T> out(padded(net.out()) * kTile);
-    const T* result = table_.mlp_forward(net, in, tape);
+    const T* result = table_.mlp_forward(net, in, in + plane);
     std::copy_n(result, out.size(), out.data());
-    if (bias) {
-      table_.mlp_tape(net, in, tape);
-      for (int o = 0; o < net.out(); ++o) grad[o * kTile] = weight[o];  // one particle of the tile
-      table_.mlp_backward(net, in, tape, grad, nullptr, bias, nullptr);
-    }
     return out;
+  }
+  /// Its adjoint, given the gradient of the outputs [out]: adds that of the folded first bias and
+  /// those of the weights (PackedMlp::weight_sums); each may be null.
+  void at_rest(const PackedMlp<T>& net, const T* outputs, T* bias, T* weight_sums) const {
+    const std::ptrdiff_t plane = std::ptrdiff_t(net.max_width) * kTile;
+    T* in = scratch_of_thread<T>(net.tape_scratch() + 2 * plane);
+    T *grad = in + plane, *tape = grad + plane;
+    std::fill_n(in, 2 * plane, T(0));
+    table_.mlp_tape(net, in, tape);
+    for (int o = 0; o < net.out(); ++o) grad[o * kTile] = outputs[o];  // one particle of the tile
+    table_.mlp_backward(net, in, tape, grad, nullptr, bias, weight_sums);
+  }
+  /// What the two networks at rest receive: what is taken off at rest and, of networks that answer
+  /// to z alone, everything.
+  std::vector<T> stress_outputs(const T* accumulator) const {
+    std::vector<T> outputs(accumulator + law_.coefficient_sums(),
+                           accumulator + law_.accumulator_size());
+    outputs[1] += accumulator[law_.scale_sums() + 2];
+    return outputs;
+  }
+  std::vector<T> projection_outputs(const T* accumulator) const {
+    std::vector<T> outputs(accumulator + law_.cap_sums(), accumulator + law_.coefficient_sums());
+    if (law_.rest_cap < 0) outputs[1] += accumulator[law_.scale_sums() + 3];
+    return outputs;
+  }
+  /// Adds the gradient of the first weight of a network that answers to z alone: that of its first
+  /// bias for each feature, whose column of features [out, in] is what the outputs receive.
+  void add_features(const PackedMlp<T>& net, const T* features, T* weight_sums) const {
+    const std::ptrdiff_t stride = weight_stride(net.in());
+    std::vector<T> outputs(net.out()), bias;
+    for (int i = 0; i < net.in(); ++i) {
+      for (int o = 0; o < net.out(); ++o) outputs[o] = features[o * net.in() + i];
+      bias.assign(net.layer[0].out, T(0));
+      at_rest(net, outputs.data(), bias.data(), nullptr);
+      for (int o = 0; o < net.layer[0].out; ++o) weight_sums[o * stride + i] += bias[o];
+    }
   }
 
   std::ptrdiff_t latent_size_;
   const LearnedLawTable<T>& table_;
-  PackedMlpStorage<T> projection_, stress_;
+  std::shared_ptr<const PackedNetworks<T>> packed_;
+  FoldedMlp<T> projection_, stress_;
   AlignedBuffer<T> rest_projection_, rest_stress_;
   LearnedLaw<T> law_{};
 };
@@ -190,7 +235,7 @@ class LearnedLawKernel final : public LawKernel<T> {
 template <class T>
 std::shared_ptr<const LawKernel<T>> make_learned_law(const LawDescription& description) {
   if (!description.weights) throw Error("law learned: expected a trained model, found none");
-  description.weights->check();
+  description.weights->packed<T>();  // what does not fit is found here
   const std::size_t expected = std::size_t(description.weights->latent_size);
   if (description.z.size() != expected)
     throw Error("law learned: expected a latent of " + std::to_string(expected) +

@@ -24,13 +24,13 @@ void learned_evaluate(const LearnedLaw<T>& law, std::ptrdiff_t count, View<const
 template <class T>
 void learned_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, View<const T> F_trial,
                      View<const T> C, View<const T> grad_F_proj, View<const T> grad_tau,
-                     View<T> grad_F_trial, View<T> grad_C, T* accumulator, T* scratch) {
+                     View<T> grad_F_trial, View<T> grad_C, T* accumulator, T* weight_sums, T* scratch) {
   if (law.form == LawForm::isotropic)
     isotropic_adjoint(law, count, F_trial, C, grad_F_proj, grad_tau, grad_F_trial, grad_C,
-                      accumulator, scratch);
+                      accumulator, weight_sums, scratch);
   else
     published_adjoint(law, count, F_trial, C, grad_F_proj, grad_tau, grad_F_trial, grad_C,
-                      accumulator, scratch);
+                      accumulator, weight_sums, scratch);
 }
 template <class T>
 const T* table_mlp_forward(const PackedMlp<T>& net, const T* in, T* scratch) {
@@ -42,8 +42,8 @@ void table_mlp_tape(const PackedMlp<T>& net, const T* in, T* tape) {
 }
 template <class T>
 void table_mlp_backward(const PackedMlp<T>& net, const T* in, T* tape, const T* grad_out,
-                        T* grad_in, T* first_bias, const WeightGradient<T>* weights) {
-  mlp_backward(net, in, tape, grad_out, grad_in, first_bias, weights);
+                        T* grad_in, T* first_bias, T* weight_sums) {
+  mlp_backward(net, in, tape, grad_out, grad_in, first_bias, weight_sums);
 }
 
 template <class T>

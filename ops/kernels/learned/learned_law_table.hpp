@@ -29,13 +29,22 @@ struct LearnedLaw {
   std::ptrdiff_t cap_sums() const { return scale_sums() + 4; }
   std::ptrdiff_t coefficient_sums() const { return cap_sums() + projection.out(); }
   std::ptrdiff_t accumulator_size() const { return coefficient_sums() + stress.out(); }
-};
 
-/// Where the gradients of one layer are added, aligned to 64 bytes.
-template <class T>
-struct WeightGradient {
-  T* weight;  ///< [padded(out), weight_stride(in)]
-  T* bias;    ///< [out]
+  /// Layout of the running sum of the weights: those of the two networks (PackedMlp::weight_sums),
+  /// then, of networks that answer to z alone, Σ g xᵀ [out, in] of what their outputs receive and
+  /// the features that they would see: through the network at rest this is what the first weight,
+  /// zero as it is there, would gain.
+  std::ptrdiff_t stress_weight_sums() const { return projection.weight_sums(); }
+  std::ptrdiff_t projection_feature_sums() const {
+    return stress_weight_sums() + stress.weight_sums();
+  }
+  std::ptrdiff_t stress_feature_sums() const {
+    return projection_feature_sums() + projection.out() * projection.in();
+  }
+  /// Whole vectors, so that one running sum after the other is aligned.
+  std::ptrdiff_t weight_sums_size() const {
+    return weight_stride(int(stress_feature_sums()) + stress.out() * stress.in());
+  }
 };
 
 /// The learned law's inner loops on one instruction set.
@@ -49,15 +58,16 @@ struct LearnedLawTable {
   /// LawKernel::adjoint of at most kTile particles; grad_F_proj and grad_tau must be given.
   void (*adjoint)(const LearnedLaw<T>&, std::ptrdiff_t count, View<const T> F_trial,
                   View<const T> C, View<const T> grad_F_proj, View<const T> grad_tau,
-                  View<T> grad_F_trial, View<T> grad_C, T* accumulator, T* scratch);
+                  View<T> grad_F_trial, View<T> grad_C, T* accumulator, T* weight_sums,
+                  T* scratch);
   /// A bare network on one tile of planes: in [padded(in), kTile] → [padded(out), kTile] in
   /// `scratch` of forward_scratch() numbers.
   const T* (*mlp_forward)(const PackedMlp<T>&, const T* in, T* scratch);
   /// What mlp_backward needs of mlp_forward: a tape of tape_scratch() numbers.
   void (*mlp_tape)(const PackedMlp<T>&, const T* in, T* tape);
-  /// The adjoint, given the tape; grad_in, first_bias, weights may be null.
+  /// The adjoint, given the tape; grad_in, first_bias, weight_sums may be null.
   void (*mlp_backward)(const PackedMlp<T>&, const T* in, T* tape, const T* grad_out, T* grad_in,
-                       T* first_bias, const WeightGradient<T>* weights);
+                       T* first_bias, T* weight_sums);
 };
 
 UNIPHY_ISA_TABLE(LearnedLawTable<float>)

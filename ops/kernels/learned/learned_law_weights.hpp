@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -43,6 +44,24 @@ constexpr NetworkShape network_shape(LawForm form) {
   return form == LawForm::isotropic ? NetworkShape{3, 4, 6, 8} : NetworkShape{30, 9, 25, 9};
 }
 
+template <class T>
+struct PackedNetworks;
+
+/// Where weights keep their packed form, one for each precision, made when a law first asks for it.
+/// A copy of the weights may be changed, so it packs its own.
+class PackedNetworksCache {
+ public:
+  PackedNetworksCache() = default;
+  PackedNetworksCache(const PackedNetworksCache&) {}
+  PackedNetworksCache& operator=(const PackedNetworksCache&);
+
+ private:
+  friend struct LearnedLawWeights;
+  std::mutex mutex_;
+  std::shared_ptr<const PackedNetworks<float>> narrow_;
+  std::shared_ptr<const PackedNetworks<double>> wide_;
+};
+
 /// The learned law without torch: what a model file holds. The first layers take the features of
 /// network_shape first, then z.
 struct LearnedLawWeights {
@@ -54,7 +73,19 @@ struct LearnedLawWeights {
 
   /// Throws Error naming the first layer whose shape does not fit.
   void check() const;
+
+  /// The networks as the kernels read them (packed_networks.hpp), packed in the first call and
+  /// shared by the laws of all z. Weights that a law was made of must not change
+  /// any more; their copies may. Safe to call from several threads. Throws Error where check() does.
+  template <class T>
+  std::shared_ptr<const PackedNetworks<T>> packed() const;
+  mutable PackedNetworksCache packed_networks = {};
 };
+
+template <>
+std::shared_ptr<const PackedNetworks<float>> LearnedLawWeights::packed() const;
+template <>
+std::shared_ptr<const PackedNetworks<double>> LearnedLawWeights::packed() const;
 
 /// Whether the first `features` inputs of a network, those before z, have no weight.
 bool ignores_state(const MlpWeights& network, int features);

@@ -169,11 +169,12 @@ inline void published_evaluate(const LearnedLaw<T>& law, std::ptrdiff_t count,
 }
 
 /// The adjoint of published_evaluate, recomputing its forward pass tile by tile. Overwrites
-/// grad_F_trial, adds to grad_C and accumulator (both may be null).
+/// grad_F_trial, adds to grad_C, accumulator and weight_sums (each may be null).
 template <class T>
 inline void published_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, View<const T> F_trial,
                               View<const T> C, View<const T> grad_F_proj, View<const T> grad_tau,
-                              View<T> grad_F_trial, View<T> grad_C, T* accumulator, T* scratch) {
+                              View<T> grad_F_trial, View<T> grad_C, T* accumulator, T* weight_sums,
+                              T* scratch) {
   using V = Lanes<T>;
   using namespace seed_detail;
   constexpr int w = width_of<V>;
@@ -191,7 +192,8 @@ inline void published_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, Vi
   }
   mlp_backward<T>(law.stress, tile.stress_in, tile.stress_tape, tile.grad_stress,
                   tile.grad_features,
-                  accumulator ? accumulator + law.projection.layer[0].out : nullptr, nullptr);
+                  accumulator ? accumulator + law.projection.layer[0].out : nullptr,
+                  weight_sums ? weight_sums + law.stress_weight_sums() : nullptr);
   for (std::ptrdiff_t l = 0; l < kTile; l += w) {
     const Mat3<V> F = get3<V>(tile.projection_in, 0, l) + get3<V>(delta, 0, l);
     const Svd3<V> svd = projected_svd<V>(tile, l);
@@ -226,7 +228,7 @@ inline void published_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, Vi
       store_mat3<V, T>(grad_C, l, count - l, mult(mul(s.R, g_rate), s.R), true);
   }
   mlp_backward<T>(law.projection, tile.projection_in, tile.tape, tile.grad_projection,
-                  tile.grad_features, accumulator, nullptr);
+                  tile.grad_features, accumulator, weight_sums);
   for (std::ptrdiff_t l = 0; l < count; l += w) {
     Vec3<V> g_sigma;
     for (int i = 0; i < 3; ++i)

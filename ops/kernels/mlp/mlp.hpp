@@ -2,7 +2,6 @@
 
 #include <type_traits>
 
-#include "ops/kernels/learned/learned_law_table.hpp"
 #include "ops/kernels/mlp/activation.hpp"
 #include "ops/kernels/mlp/weight_gradient.hpp"
 
@@ -143,19 +142,21 @@ inline T* mlp_forward_tape(const PackedMlp<T>& net, const T* in, T* tape,
 
 /// grad_out [padded(out), kTile] → grad_in [padded(in), kTile] (may be null), given the tape of the
 /// same tile. What rows of grad_out beyond out() hold does not matter. `first_bias`, if given, has
-/// the gradient of the first layer's bias added, [out of layer 0]. `weights`, if given, has one
-/// entry a layer; gradients of weights and biases are added to it.
+/// the gradient of the first layer's bias added, [out of layer 0]. `weight_sums`, if given, has the
+/// gradients of weights and biases added (PackedMlp::weight_sums, aligned to 64 bytes).
 template <class T>
 inline void mlp_backward(const PackedMlp<T>& net, const T* in, T* tape, const T* grad_out,
-                         T* grad_in, T* first_bias, const WeightGradient<T>* weights) {
+                         T* grad_in, T* first_bias, T* weight_sums) {
   T* buffer[2] = {tape_value(net, tape, net.depth), tape_slope(net, tape, net.depth)};
   const T* grad = grad_out;
+  if (weight_sums) weight_sums += net.weight_sums();
   for (int k = net.depth - 1; k >= 0; --k) {
     const PackedLayer<T>& layer = net.layer[k];
-    if (weights) {
+    if (weight_sums) {
+      weight_sums -= weight_sums_of_layer(layer.in, layer.out);
       const T* from = k == 0 ? in : tape_value(net, tape, k - 1);
       tile_weight_gradient(layer.out, layer.in, grad, from, tape_value(net, tape, net.depth + 1),
-                           weights[k]);
+                           weight_sums);
     }
     if (k == 0) {
       if (first_bias)

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <vector>
 
 #include "ops/kernels/laws/law.hpp"
@@ -12,10 +13,15 @@ inline constexpr std::ptrdiff_t kTile = kLawChunk;
 /// Outputs that are computed together; packed rows are padded with zeros to a multiple of it.
 inline constexpr int kOutputBlock = 4;
 
+constexpr int padded(int n) { return (n + kOutputBlock - 1) / kOutputBlock * kOutputBlock; }
+
 /// Rows of a weight's gradient are padded to whole vectors of any instruction set.
 constexpr std::ptrdiff_t weight_stride(int in) { return (in + 15) / 16 * 16; }
-
-constexpr int padded(int n) { return (n + kOutputBlock - 1) / kOutputBlock * kOutputBlock; }
+/// Numbers of the running sum of a layer's gradients: of the weight, [padded(out),
+/// weight_stride(in)], then of the bias, [out] in weight_stride(out) numbers.
+constexpr std::ptrdiff_t weight_sums_of_layer(int in, int out) {
+  return padded(out) * weight_stride(in) + weight_stride(out);
+}
 
 /// One layer as the kernels read it. All pointers are borrowed.
 template <class T>
@@ -44,27 +50,68 @@ struct PackedMlp {
   std::ptrdiff_t tape_scratch() const {
     return (2 * std::ptrdiff_t(depth + 1) * max_width + weight_stride(max_width)) * kTile;
   }
+  /// Numbers of a running sum of the gradients of all weights and biases, layer after layer
+  /// (weight_sums_of_layer), but for the part of the first weight that takes the latent.
+  std::ptrdiff_t weight_sums() const {
+    std::ptrdiff_t size = 0;
+    for (int k = 0; k < depth; ++k) size += weight_sums_of_layer(layer[k].in, layer[k].out);
+    return size;
+  }
 };
 
-/// Owns the packed numbers of a network whose first layer has had the latent folded into its bias.
+/// Owns the packed numbers of a network whose first layer takes [features, z]: packed once, for
+/// every z.
 template <class T>
 class PackedMlpStorage {
  public:
-  /// Folds z: the first layer's inputs are [features, z] and its bias becomes b + W_z z.
-  PackedMlpStorage(const MlpWeights& weights, Activation activation, const std::vector<double>& z);
+  PackedMlpStorage(const MlpWeights& weights, Activation activation, int latent_size);
   PackedMlpStorage(const PackedMlpStorage&) = delete;
   PackedMlpStorage& operator=(const PackedMlpStorage&) = delete;
 
+  /// The network of the features, as it is where z = 0.
   const PackedMlp<T>& mlp() const { return mlp_; }
+  int latent_size() const { return latent_size_; }
+  /// What z makes of the first bias: b + W_z z, [padded(out of layer 0)].
+  std::vector<T> folded_bias(const std::vector<double>& z) const;
   /// Adds W_zᵀ g to z_gradient, g being the gradient of the folded bias [out of layer 0].
   void add_latent_gradient(const T* bias_gradient, std::vector<double>& z_gradient) const;
+
+  /// Weights and biases of all layers, z's part of the first included.
+  std::ptrdiff_t weight_size() const;
+  /// Adds a running sum (PackedMlp::weight_sums) to a gradient of weight_size() numbers, of each
+  /// layer the weight [out, in], row-major, then the bias. The latent's part of the first weight is
+  /// left out.
+  void add_weight_gradient(const T* sums, T* gradient) const;
 
  private:
   std::vector<std::vector<T>> numbers_;
   std::vector<PackedLayer<T>> layers_;
+  std::vector<double> first_bias_;     // [out of layer 0]
   std::vector<double> latent_weight_;  // [out of layer 0, latent]
-  std::size_t latent_size_ = 0;
+  int latent_size_ = 0;
   PackedMlp<T> mlp_{};
+};
+
+/// A packed network with one z folded into its first bias; all else is shared.
+template <class T>
+class FoldedMlp {
+ public:
+  FoldedMlp(std::shared_ptr<const PackedMlpStorage<T>> packed, std::vector<double> z);
+  FoldedMlp(const FoldedMlp&) = delete;
+  FoldedMlp& operator=(const FoldedMlp&) = delete;
+
+  const PackedMlp<T>& mlp() const { return mlp_; }
+  const PackedMlpStorage<T>& packed() const { return *packed_; }
+  /// PackedMlpStorage::add_weight_gradient with the latent's part of the first weight, g zᵀ, g being
+  /// the gradient of the first bias.
+  void add_weight_gradient(const T* sums, T* gradient) const;
+
+ private:
+  std::shared_ptr<const PackedMlpStorage<T>> packed_;
+  std::vector<double> z_;
+  std::vector<T> bias_;
+  std::vector<PackedLayer<T>> layers_;
+  PackedMlp<T> mlp_;
 };
 
 }  // namespace uniphy::kernels

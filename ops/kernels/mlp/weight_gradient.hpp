@@ -1,6 +1,6 @@
 #pragma once
 
-#include "ops/kernels/learned/learned_law_table.hpp"
+#include "ops/kernels/mlp/packed_mlp.hpp"
 #include "ops/kernels/simd/transpose4.hpp"
 
 // The gradients of a layer's weight and bias over a tile: dL/dW += g xᵀ summed over the particles,
@@ -51,10 +51,11 @@ inline void add_outer_products(const T* g, const T* x, std::ptrdiff_t stride, T*
 }
 
 /// Adds the gradients of one layer's weight and bias. What rows of g beyond `out` and of x beyond
-/// `in` hold does not matter. turned: [kTile, weight_stride(in)], scratch.
+/// `in` hold does not matter. sums: weight_sums_of_layer(in, out) numbers, aligned to 64 bytes;
+/// turned: [kTile, weight_stride(in)], scratch.
 template <class T>
 inline void tile_weight_gradient(int out, int in, const T* g, const T* x, T* turned,
-                                 const WeightGradient<T>& to) {
+                                 T* sums) {
   constexpr int w = width_of<Lanes<T>>;
   // 16 sums of a 32-register file, 8 of a 16-register one.
   constexpr int kOut = w * sizeof(T) >= 64 ? 8 : 4;
@@ -63,7 +64,7 @@ inline void tile_weight_gradient(int out, int in, const T* g, const T* x, T* tur
   const int vectors = (in + w - 1) / w;
   for (int o = 0; o < out; o += kOut) {
     const T* g_o = g + o * kTile;
-    T* weight = to.weight + o * stride;
+    T* weight = sums + o * stride;
     const bool all = padded(out) - o >= kOut;  // else one block of four rows is left
     for (int v = 0; v < vectors; v += 2) {
       const bool both = v + 1 < vectors;
@@ -73,7 +74,8 @@ inline void tile_weight_gradient(int out, int in, const T* g, const T* x, T* tur
       add(g_o, turned + v * w, stride, weight + v * w);
     }
   }
-  for (int o = 0; o < out; ++o) to.bias[o] += plane_sum(g + o * kTile);
+  T* bias = sums + padded(out) * stride;
+  for (int o = 0; o < out; ++o) bias[o] += plane_sum(g + o * kTile);
 }
 
 }  // namespace UNIPHY_ISA

@@ -143,8 +143,12 @@ void Rollout<T>::record(const ParticleState<T>& initial, std::ptrdiff_t steps, s
 }
 
 template <class T>
-RolloutGradient<T> Rollout<T>::adjoint(const RolloutTape<T>& tape, const T* grad_x,
-                                       const T* grad_v) const {
+RolloutGradient<T> Rollout<T>::adjoint(const RolloutTape<T>& tape, const T* grad_x, const T* grad_v,
+                                       const std::vector<bool>& of_weights) const {
+  if (!of_weights.empty() && of_weights.size() != bodies_.size()) {
+    throw Error("roll-out: expected " + std::to_string(bodies_.size()) + " bodies in of_weights, " +
+                "found " + std::to_string(of_weights.size()));
+  }
   RolloutGradient<T> result;
   ParticleState<T>& grad = result.state;
   grad.x.assign(3 * particles(), T(0));
@@ -158,6 +162,7 @@ RolloutGradient<T> Rollout<T>::adjoint(const RolloutTape<T>& tape, const T* grad
   }
 
   RolloutEngine<T> engine(*this);
+  engine.want_weights(of_weights);
   const typename RolloutEngine<T>::FrameGradients frames{grad_x, grad_v, tape.every};
   for (std::ptrdiff_t k = static_cast<std::ptrdiff_t>(tape.checkpoints.size()) - 1; k >= 0; --k) {
     call_between_steps();
@@ -174,6 +179,14 @@ RolloutGradient<T> Rollout<T>::adjoint(const RolloutTape<T>& tape, const T* grad
     accumulator.resize(law.accumulator_size(), T(0));
     result.parameters.emplace_back(law.parameter_size(), T(0));
     law.parameter_gradient(accumulator.data(), result.parameters.back().data());
+    result.weights.emplace_back();
+    if (of_weights.empty() || !of_weights[b]) continue;
+    const std::vector<double>& weight_sum = engine.weight_sum(static_cast<int>(b));
+    AlignedBuffer<T> weight_sums(law.weight_sums_size());
+    weight_sums.fill(T(0));
+    std::copy(weight_sum.begin(), weight_sum.end(), weight_sums.data());
+    result.weights.back().resize(law.weight_size());
+    law.weight_gradient(accumulator.data(), weight_sums.data(), result.weights.back().data());
   }
   return result;
 }

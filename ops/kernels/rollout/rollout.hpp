@@ -48,11 +48,12 @@ struct RolloutTape {
   std::vector<ParticleState<T>> checkpoints;  ///< before step 0, segment, 2 segment, …
 };
 
-/// dL/d(initial state), shapes as in ParticleState, and dL/d(law parameters) of each body.
+/// dL/d(initial state), shapes as in ParticleState, and dL/d(law parameters) of each body; where
+/// asked for, dL/d(weights of its networks) too (LawKernel::weight_gradient), else empty.
 template <class T>
 struct RolloutGradient {
   ParticleState<T> state;
-  std::vector<std::vector<T>> parameters;
+  std::vector<std::vector<T>> parameters, weights;
 };
 
 /// The material point method with explicit time steps (MLS-MPM with APIC transfers and quadratic
@@ -92,8 +93,10 @@ class Rollout {
   /// the same shape; what adjoint() needs goes to *tape, unless null.
   void record(const ParticleState<T>& initial, std::ptrdiff_t steps, std::ptrdiff_t every,
               T* frames_x, T* frames_v, RolloutTape<T>* tape) const;
-  /// The adjoint: grad_x and grad_v are dL/d(frames), either may be null.
-  RolloutGradient<T> adjoint(const RolloutTape<T>& tape, const T* grad_x, const T* grad_v) const;
+  /// The adjoint: grad_x and grad_v are dL/d(frames), either may be null. of_weights says of each
+  /// body whether the gradient of its networks is wanted; empty: of none.
+  RolloutGradient<T> adjoint(const RolloutTape<T>& tape, const T* grad_x, const T* grad_v,
+                             const std::vector<bool>& of_weights = {}) const;
 
  private:
   GridSettings grid_;

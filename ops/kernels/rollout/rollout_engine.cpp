@@ -34,7 +34,10 @@ RolloutEngine<T>::RolloutEngine(const Rollout<T>& rollout)
       states_(chunks() * std::ptrdiff_t(kStateChunkSize), Pages::huge),
       transfer_(chunks(), Pages::huge),
       grid_nodes_(grid_size(rollout.grid().n)),
-      accumulator_(order_.bodies()) {
+      accumulator_(order_.bodies()),
+      sum_count_(order_.bodies(), 0),
+      sum_start_(order_.bodies(), 0),
+      weight_sum_(order_.bodies()) {
   transfer_.fill(TransferChunk<T>{});
 }
 

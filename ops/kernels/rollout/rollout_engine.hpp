@@ -37,6 +37,9 @@ class RolloutEngine {
   /// The same for one step, with what the law saw.
   void advance_sampled(std::ptrdiff_t step, LawSample<T>& sample);
 
+  /// Says of each body whether backward() adds to its sum of the weights; empty: of none.
+  void want_weights(const std::vector<bool>& bodies);
+
   /// dL/d(frames) as the backward pass adds them: frame f belongs to state f·every.
   struct FrameGradients {
     const T* x = nullptr;
@@ -49,6 +52,8 @@ class RolloutEngine {
   void backward(ParticleState<T>& grad, std::ptrdiff_t first_step, const FrameGradients& frames);
   /// Summed accumulator of a body so far.
   const std::vector<double>& accumulator(int body) const { return accumulator_[body]; }
+  /// Summed gradients of the weights of a body so far (LawKernel::weight_sums_size numbers).
+  const std::vector<double>& weight_sum(int body) const { return weight_sum_[body]; }
 
  private:
   T* state(std::ptrdiff_t s, int chunk) {
@@ -66,6 +71,9 @@ class RolloutEngine {
   /// since laws differ in cost.
   template <class Visit>
   void for_chunks(int part, int parts, const Visit& visit) const;
+  /// The same split that leaves the chunks of one running sum of the weights to one thread.
+  template <class Visit>
+  void for_chunks_backward(int part, int parts, const Visit& visit) const;
   int threads() const;
   void throw_if_lost(std::ptrdiff_t step);
 
@@ -75,6 +83,7 @@ class RolloutEngine {
   void begin_backward_step(int chunk, std::ptrdiff_t s);
   void transfer_layers_backward(std::ptrdiff_t s, int part, int parts);
   void end_backward_step(int chunk, std::ptrdiff_t s);
+  T* weight_sums_of(int chunk);
   void add_frame(int chunk, const T* rows, int plane);
 
   const Rollout<T>& rollout_;
@@ -98,6 +107,12 @@ class RolloutEngine {
   AlignedBuffer<T> accumulators_;           ///< of chunk c from accumulator_start_[c] on
   std::vector<std::ptrdiff_t> accumulator_start_;
   std::vector<std::vector<double>> accumulator_;
+
+  /// The chunks of a body are dealt, in order, to this many running sums of its weights; 0: none.
+  std::vector<int> sum_count_;
+  std::vector<std::ptrdiff_t> sum_start_;         ///< of the first one of a body
+  AlignedBuffer<T> weight_sums_{0, Pages::huge};
+  std::vector<std::vector<double>> weight_sum_;
 };
 
 template <class T>
@@ -107,6 +122,20 @@ void RolloutEngine<T>::for_chunks(int part, int parts, const Visit& visit) const
     const std::ptrdiff_t first = order_.first_chunk(b), n = order_.first_chunk(b + 1) - first;
     for (std::ptrdiff_t c = first + n * part / parts; c < first + n * (part + 1) / parts; ++c) {
       visit(static_cast<int>(c));
+    }
+  }
+}
+
+template <class T>
+template <class Visit>
+void RolloutEngine<T>::for_chunks_backward(int part, int parts, const Visit& visit) const {
+  for (int b = 0; b < order_.bodies(); ++b) {
+    const std::ptrdiff_t first = order_.first_chunk(b), n = order_.first_chunk(b + 1) - first;
+    // A unit is a chunk, or all chunks of a running sum.
+    const std::ptrdiff_t units = sum_count_[b] > 0 ? sum_count_[b] : n;
+    for (std::ptrdiff_t c = n * (units * part / parts) / std::max<std::ptrdiff_t>(units, 1);
+         c < n * (units * (part + 1) / parts) / std::max<std::ptrdiff_t>(units, 1); ++c) {
+      visit(static_cast<int>(first + c));
     }
   }
 }

@@ -40,7 +40,7 @@ class SimpleLaw : public LawKernel<T> {
 
   void adjoint(std::ptrdiff_t count, T, View<const T> F_trial, View<const T> C,
                View<const T> grad_F_proj, View<const T> grad_tau, View<T> grad_F_trial,
-               View<T> grad_C, T* accumulator) const override {
+               View<T> grad_C, T* accumulator, T*) const override {
     for (std::ptrdiff_t p = 0; p < count; ++p) {
       T F[9], g[9], cofactor[9], sum[4] = {0, 0, 0, 0};
       project(F_trial, p, F);
