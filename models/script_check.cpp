@@ -49,11 +49,11 @@ ScriptDifference compare_with_kernels(const ScriptLaw& script,
                                       const kernels::LearnedLawWeights& weights,
                                       const std::vector<std::vector<double>>& codes,
                                       const Probe& probe) {
-  const auto shared = std::make_shared<const kernels::LearnedLawWeights>(weights);
+  const ops::LearnedNetworks networks = ops::to_networks(weights, torch::kFloat64);
   ScriptDifference largest;
   for (const auto& code : codes) {
     const Tensor z = torch::tensor(code, torch::kFloat64);
-    const ops::LawOutput expected = ops::learned_law(shared, probe.F, probe.C, z);
+    const ops::LawOutput expected = ops::learned_law(networks, probe.F, probe.C, z);
     const Tensor F_proj = script.project(probe.F, z);
     const Tensor tau = script.stress(expected.F_proj, probe.C, z);
     // std::max would drop a NaN.

@@ -158,8 +158,7 @@ variable_list backward(const MlpProblem<T>& problem, const torch::Tensor& featur
         to_tile(problem, of_out, t, net.out(), grad_out);
         table.mlp_tape(of_code, in, tape);
         table.mlp_backward(of_code, in, tape, grad_out, want_features ? grad_in : nullptr,
-                           want_bias ? first_bias.data() + t * width : nullptr,
-                           weights);
+                           want_bias ? first_bias.data() + t * width : nullptr, weights);
         if (want_features) from_tile(problem, grad_in, t, n_in, to_features);
       }
     }

@@ -18,16 +18,24 @@ using torch::autograd::variable_list;
 
 namespace {
 
+/// Which numbers of a body's networks want a gradient, and how many they are.
+struct BodyWeights {
+  bool projection = false, stress = false;
+  std::int64_t projection_size = 0, stress_size = 0;
+};
+
 /// What forward leaves for backward. One for each call.
 template <class T>
 struct Recording : torch::CustomClassHolder {
   explicit Recording(kernels::Rollout<T> r) : rollout(std::move(r)) {}
   kernels::Rollout<T> rollout;
   kernels::RolloutTape<T> tape;
+  std::vector<BodyWeights> weights;
 };
 
 struct Plan : torch::CustomClassHolder {
   std::vector<RolloutBody> bodies;
+  std::vector<BodyWeights> weights;
   RolloutSettings settings;
   bool record = false;  ///< a backward pass may come
 };
@@ -54,6 +62,33 @@ Tensor pack_parameters(const std::vector<RolloutBody>& bodies) {
   return torch::cat(all);
 }
 
+/// All numbers that want a gradient of the networks of all bodies, one after the other, in the
+/// dtype of the roll-out; differentiable. The kernels take the numbers themselves from the
+/// networks.
+Tensor pack_weights(const std::vector<RolloutBody>& bodies, const std::vector<BodyWeights>& wanted,
+                    torch::ScalarType type) {
+  variable_list all{torch::empty({0}, type)};
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    if (wanted[b].projection) all.push_back(bodies[b].networks.projection.numbers.to(type));
+    if (wanted[b].stress) all.push_back(bodies[b].networks.stress.numbers.to(type));
+  }
+  return torch::cat(all);
+}
+
+/// The gradient of pack_weights.
+template <class T>
+Tensor weight_gradient(const std::vector<std::vector<T>>& of_bodies,
+                       const std::vector<BodyWeights>& wanted) {
+  std::vector<T> all;
+  for (std::size_t b = 0; b < of_bodies.size(); ++b) {
+    const auto stress = of_bodies[b].end() - (wanted[b].stress ? wanted[b].stress_size : 0);
+    if (wanted[b].projection)
+      all.insert(all.end(), of_bodies[b].begin(), of_bodies[b].begin() + wanted[b].projection_size);
+    all.insert(all.end(), stress, of_bodies[b].end());
+  }
+  return torch::tensor(all, c10::CppTypeToScalarType<T>::value);
+}
+
 template <class T>
 kernels::Rollout<T> make_rollout(const Plan& plan, const Tensor& parameters, const Tensor& mass,
                                  const Tensor& volume) {
@@ -71,6 +106,7 @@ class RolloutFunction : public torch::autograd::Function<RolloutFunction> {
  public:
   static variable_list forward(AutogradContext* ctx, const Tensor& x, const Tensor& v,
                                const Tensor& C, const Tensor& F, const Tensor& parameters,
+                               const Tensorconst Tensor& weights, /*weights: for the graph*/,
                                const Tensor& mass, const Tensor& volume,
                                const c10::intrusive_ptr<Plan>& plan) {
     const RolloutSettings& settings = plan->settings;
@@ -88,6 +124,7 @@ class RolloutFunction : public torch::autograd::Function<RolloutFunction> {
           settings.every, frames_x.template data_ptr<T>(),
           settings.velocities ? frames_v.template data_ptr<T>() : nullptr,
           plan->record ? &recording->tape : nullptr);
+      recording->weights = plan->weights;
       ctx->saved_data["recording"] = torch::IValue::make_capsule(recording);
     });
     ctx->saved_data["double"] = x.scalar_type() == torch::kFloat64;
@@ -96,7 +133,7 @@ class RolloutFunction : public torch::autograd::Function<RolloutFunction> {
   }
 
   static variable_list backward(AutogradContext* ctx, variable_list grad_out) {
-    variable_list grad(8);
+    variable_list grad(9);
     const bool is_double = ctx->saved_data["double"].toBool();
     if (grad_out[1].defined() && grad_out[1].numel() == 0) grad_out[1] = Tensor();
     if (!grad_out[0].defined() && !grad_out[1].defined()) return grad;
@@ -104,8 +141,12 @@ class RolloutFunction : public torch::autograd::Function<RolloutFunction> {
       using T = decltype(real);
       const auto recording = c10::static_intrusive_pointer_cast<Recording<T>>(
           ctx->saved_data["recording"].toCapsule());
-      const kernels::RolloutGradient<T> g = recording->rollout.adjoint(
-          recording->tape, gradient_data<T>(grad_out[0]), gradient_data<T>(grad_out[1]));
+      std::vector<bool> of_weights;
+      for (const BodyWeights& w : recording->weights)
+        of_weights.push_back(ctx->needs_input_grad(5) && (w.projection || w.stress));
+      const kernels::RolloutGradient<T> g =
+          recording->rollout.adjoint(recording->tape, gradient_data<T>(grad_out[0]),
+                                     gradient_data<T>(grad_out[1]), of_weights);
       const std::int64_t P = recording->rollout.particles();
       const auto type = is_double ? torch::kFloat64 : torch::kFloat32;
       const auto put = [&](int i, const std::vector<T>& values, at::IntArrayRef sizes) {
@@ -122,6 +163,7 @@ class RolloutFunction : public torch::autograd::Function<RolloutFunction> {
         for (const auto& body : g.parameters) all.insert(all.end(), body.begin(), body.end());
         grad[4] = torch::tensor(all, torch::kFloat64);
       }
+      if (ctx->needs_input_grad(5)) grad[5] = weight_gradient(g.weights, recording->weights);
     });
     return once_differentiable("rollout", std::move(grad));
   }
@@ -152,19 +194,31 @@ RolloutFrames rollout(const Tensor& x0, const Tensor& v0, const Tensor& C0, cons
   auto plan = c10::make_intrusive<Plan>();
   plan->bodies = bodies;
   for (RolloutBody& body : plan->bodies) {
+    BodyWeights& wanted = plan->weights.emplace_back();
     if (!body.networks.defined()) continue;
+    const std::string op = "rollout: body " + std::to_string(plan->weights.size() - 1);
+    check_networks(op.c_str(), body.networks);
+    const Tensor &projection = body.networks.projection.numbers,
+                 &stress = body.networks.stress.numbers;
+    wanted = {projection.requires_grad(), stress.requires_grad(), projection.numel(),
+              stress.numel()};
     body.law.id = LawId::learned;
-    body.law.weights = std::make_shared<kernels::LearnedLawWeights>(to_weights(body.networks));
+    body.law.weights = kernel_weights(body.networks);
   }
   plan->settings = settings;
   const Tensor packed = pack_parameters(plan->bodies);
-  for (RolloutBody& body : plan->bodies) body.parameters = Tensor();  // `packed` carries them
+  const Tensor weights = pack_weights(plan->bodies, plan->weights, type);
+  for (RolloutBody& body : plan->bodies) {  // the two carry them
+    body.parameters = Tensor();
+    body.networks = {};
+  }
   const Tensor v = checked("rollout", "v0", v0, type, {P, 3});
   const Tensor m = checked("rollout", "mass", mass, type, {P}).detach();
   const Tensor V = checked("rollout", "volume", volume, type, {P}).detach();
-  for (const Tensor& t : {x, v, C, F, packed}) plan->record = plan->record || t.requires_grad();
+  for (const Tensor& t : {x, v, C, F, packed, weights})
+    plan->record = plan->record || t.requires_grad();
   plan->record = plan->record && torch::GradMode::is_enabled();
-  const variable_list out = RolloutFunction::apply(x, v, C, F, packed, m, V, plan);
+  const variable_list out = RolloutFunction::apply(x, v, C, F, packed, weights, m, V, plan);
   return {out[0], settings.velocities ? out[1] : Tensor()};
 }
 

@@ -17,7 +17,8 @@ struct RolloutBody {
   /// parameters in the order of kernels::law_parameters(law.id), or the latent z of a learned law.
   /// Replaces the numbers in `law`; undefined: those are used.
   torch::Tensor parameters;
-  /// The networks of a learned law; they take the place of law.weights.
+  /// The networks of a learned law, by whose numbers the roll-out is differentiated too; they take
+  /// the place of law.id and law.weights. Bodies may share them.
   LearnedNetworks networks = {};
 };
 
@@ -36,7 +37,8 @@ struct RolloutFrames {
 /// `steps` MPM steps (kernels::Rollout) as one differentiable op.
 ///   x0 [P, 3] m, v0 [P, 3] m/s, C0 [P, 3, 3] 1/s (undefined: zero), F0 [P, 3, 3] (undefined: I),
 ///   mass [P] kg, volume [P] m³ at rest: all float32 or all float64, CPU
-/// Differentiable, once, by x0, v0, C0, F0 and the parameters of every body; mass and volume are
+/// Differentiable, once, by x0, v0, C0, F0, the parameters of every body and the numbers of its
+/// networks (where none of those wants a gradient, its price is not paid); mass and volume are
 /// constants. The backward pass replays segments from checkpoints: memory grows with sqrt(steps).
 /// The same bits on any number of threads. Throws Error naming the argument, what was expected and
 /// what was found; or the particle that leaves the grid, with the step and the likely cause.

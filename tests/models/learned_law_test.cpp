@@ -52,8 +52,8 @@ TEST_P(LearnedLawModule, RunsTheFormulasOfTheKernels) {
   const Probe probe = probe_states(200, 1);
   torch::manual_seed(2);
   const Tensor z = 0.4 * torch::randn({5}, torch::kFloat64);
-  const auto out = ops::learned_law(std::make_shared<kernels::LearnedLawWeights>(law->weights()),
-                                    probe.F, probe.C, z);
+  const auto out =
+      ops::learned_law(ops::to_networks(law->weights(), torch::kFloat64), probe.F, probe.C, z);
   const Tensor F_proj = law->project(probe.F, z);
   EXPECT_LE(relative(F_proj, out.F_proj), 1e-10);
   EXPECT_LE(relative(law->stress(F_proj, probe.C, z), out.tau), 1e-9);

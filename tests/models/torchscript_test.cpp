@@ -130,7 +130,7 @@ TEST_P(ScriptLawCase, RunsWhereNoneOfThisProjectIsLinked) {
   const Probe probe = probe_states(200, 9);
   const Tensor z = torch::tensor(code(6), torch::kFloat64);
   const ops::LawOutput out =
-      ops::learned_law(std::make_shared<kernels::LearnedLawWeights>(w), probe.F, probe.C, z);
+      ops::learned_law(ops::to_networks(w, torch::kFloat64), probe.F, probe.C, z);
   std::vector<Tensor> cases{probe.F, probe.C, z, out.F_proj, out.tau};
   const auto run = [this] {
     return std::system((std::string(UNIPHY_TORCHSCRIPT_CONSUMER) + " " + file("law.pt").string() +

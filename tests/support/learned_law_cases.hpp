@@ -20,6 +20,7 @@ namespace uniphy::testing {
 /// deformation_cases.
 struct LearnedLawErrors {
   std::map<std::string, double> F, C, z;
+  std::map<std::string, double> weights;  ///< along a random direction in all numbers
 };
 
 /// Fourth-order central differences of `loss` along every coordinate of `x`. Random networks have
@@ -40,9 +41,9 @@ double smooth_gradient_error(const torch::Tensor& gradient, const torch::Tensor&
 /// A law with random weights. the published form sees the factors of F, which have a derivative
 /// only where the singular values are apart: the other cases are left out.
 inline LearnedLawErrors learned_law_errors(kernels::LawForm form) {
-  const auto weights = std::make_shared<kernels::LearnedLawWeights>(
-      random_weights(form, 5, 20, 2, kernels::Activation::gelu, 7));
-  const auto elastic = kernels::without_projection(*weights);
+  const auto weights = random_weights(form, 5, 20, 2, kernels::Activation::gelu, 7);
+  const auto networks = ops::to_networks(weights, torch::kFloat64);
+  const auto elastic = ops::to_networks(*kernels::without_projection(weights), torch::kFloat64);
   LearnedLawErrors errors;
   std::mt19937_64 random(29);
   for (const DeformationCase& c : deformation_cases()) {
@@ -50,7 +51,10 @@ inline LearnedLawErrors learned_law_errors(kernels::LawForm form) {
     if (form == kernels::LawForm::published && std::min(upper, lower) < 0.01) continue;
     // A random law yields at rest, as sand does: F = I is its tip, where no derivative exists. What
     // does not yield has one there.
-    const ops::SharedWeights law = c.F == identity() ? elastic : weights;
+    const ops::LearnedNetworks& of_case = c.F == identity() ? elastic : networks;
+    ops::LearnedNetworks law = of_case;
+    law.projection.numbers = of_case.projection.numbers.clone().requires_grad_();
+    law.stress.numbers = of_case.stress.numbers.clone().requires_grad_();
     const torch::Tensor F = to_tensor({c.F}).requires_grad_();
     const torch::Tensor C = to_tensor({random_matrix(random, 8)}).requires_grad_();
     const torch::Tensor z =
@@ -62,7 +66,8 @@ inline LearnedLawErrors learned_law_errors(kernels::LawForm form) {
       const ops::LawOutput out = ops::learned_law(law, f, rate, code);
       return (G * out.F_proj + S * out.tau).sum();
     };
-    const auto g = torch::autograd::grad({loss(F, C, z)}, {F, C, z});
+    const auto g = torch::autograd::grad({loss(F, C, z)},
+                                         {F, C, z, law.projection.numbers, law.stress.numbers});
     const auto keep = [&](std::map<std::string, double>& worst, double error) {
       worst[c.group] = std::max(worst[c.group], error);
     };
@@ -72,6 +77,18 @@ inline LearnedLawErrors learned_law_errors(kernels::LawForm form) {
                                          [&](const torch::Tensor& r) { return loss(F, r, z); }));
     keep(errors.z, smooth_gradient_error(g[2], z, 1e-4,
                                          [&](const torch::Tensor& k) { return loss(F, C, k); }));
+    torch::manual_seed(31);
+    const torch::Tensor of_projection = torch::randn_like(g[3]),
+                        of_stress = torch::randn_like(g[4]);
+    const torch::Tensor along =
+        ((of_projection * g[3]).sum() + (of_stress * g[4]).sum()).reshape({1});
+    keep(errors.weights,
+         smooth_gradient_error(
+             along, torch::zeros({1}, torch::kFloat64), 1e-4, [&](const torch::Tensor& t) {
+               law.projection.numbers = of_case.projection.numbers + t * of_projection;
+               law.stress.numbers = of_case.stress.numbers + t * of_stress;
+               return loss(F, C, z);
+             }));
   }
   return errors;
 }

@@ -5,6 +5,7 @@
 #include "ops/kernels/base/error.hpp"
 #include "ops/reference/learned_law.hpp"
 #include "ops/reference/mpm_step.hpp"
+#include "ops/rollout/rollout.hpp"
 #include "uniphy/bench/added_memory.hpp"
 #include "uniphy/bench/random_law.hpp"
 #include "uniphy/bench/subjects.hpp"
@@ -99,6 +100,62 @@ Measurer::Body plain_steps(const Observation& o, const kernels::LawDescription& 
   };
 }
 
+/// An epoch on ops::rollout: the gradients of its mean squared distance from the observation, by z
+/// and, with `weights`, by every number of both networks.
+Measurer::Body rollout_epoch(const Observation& o, const kernels::LawDescription& law,
+                             bool weights) {
+  const auto tensor = [](const std::vector<double>& numbers) {
+    return torch::tensor(numbers, torch::kFloat64).to(torch::kFloat32);
+  };
+  const std::vector<double> start(o.x.begin(), o.x.begin() + 3 * o.particles);
+  const Tensor observed = tensor(o.x).view({o.frames, o.particles, 3});
+  const Tensor v = tensor(benchmark_motion().velocities(start)).view({-1, 3});
+  const Tensor volume = tensor(o.volume), mass = volume * o.density;
+  ops::RolloutSettings settings;
+  settings.grid = observed_grid(o, "bench");
+  settings.steps = (o.frames - 1) * kEpochStride;
+  settings.every = kEpochStride;
+  ops::RolloutBody body{0, o.particles, law, tensor(law.z).requires_grad_(),
+                        ops::to_networks(*law.weights, torch::kFloat32)};
+  std::vector<Tensor> leaves{body.parameters};
+  for (Tensor* numbers : {&body.networks.projection.numbers, &body.networks.stress.numbers}) {
+    numbers->requires_grad_(weights);
+    if (weights) leaves.push_back(*numbers);
+  }
+  return [=] {
+    const Tensor x = ops::rollout(observed[0], v, {}, {}, mass, volume, {body}, settings).x;
+    for (const Tensor& gradient : torch::autograd::grad({(x - observed).square().mean()}, leaves)) {
+      if (!gradient.isfinite().all().item<bool>())
+        throw Error("bench: a gradient of the roll-out with random weights is not finite");
+    }
+  };
+}
+
+/// What gradients by the weights cost beside those by z alone, in the same rounds.
+void bench_weights(const Observation& o, kernels::LawForm form, const BenchOptions& options,
+                   int threads, BenchReport& report) {
+  const kernels::LawDescription law = description(form);
+  Measurer measurer(threads);
+  double added[2];
+  for (const bool weights : {false, true}) {
+    const Measurer::Body epoch = rollout_epoch(o, law, weights);
+    apply({threads, 1});
+    const AddedMemory memory;
+    epoch();
+    added[weights] = memory.peak_mb();
+    measurer.add(weights ? "weights" : "z", epoch);
+  }
+  measurer.run({static_cast<int>(options.epoch_rounds), 0, 1e9});
+  for (const bool weights : {false, true}) {
+    const std::string name = weights ? "weights" : "z";
+    BenchRow row =
+        make_row(measurer, name, std::string("epoch ") + kernels::form_name(form) + " by " + name,
+                 "both", o.particles, 1);
+    row.memory_mb = weights ? std::max(0.0, added[1] - added[0]) : added[0];
+    report.rows.push_back(row);
+  }
+}
+
 }  // namespace
 
 void bench_epoch(const BenchOptions& options, int threads, BenchReport& report) {
@@ -135,6 +192,7 @@ void bench_epoch(const BenchOptions& options, int threads, BenchReport& report) 
     row.plain *= static_cast<double>(options.epoch_steps) / static_cast<double>(plain_steps_count);
     row.memory_mb = added;
     report.rows.push_back(row);
+    bench_weights(observation, form, options, threads, report);
   }
 }
 

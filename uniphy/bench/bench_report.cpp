@@ -66,7 +66,7 @@ std::string rows_table(const BenchReport& report) {
       "This machine: {}, multiply-adds {:.0f} Gflop/s a core ({:.0f} on {} threads), copy {:.1f} "
       "GB/s a core ({:.1f}), BLAS core type {}\n\n",
       m.isa, m.fma_core, m.fma_all, m.threads, m.copy_core, m.copy_all, m.blas);
-  const char* layout = "{:<22} {:<9} {:>9} {:>11} {:>11} {:>7} {:>7} {:>11} {:>8}  {}\n";
+  const char* layout = "{:<28} {:<9} {:>9} {:>11} {:>11} {:>7} {:>7} {:>11} {:>8}  {}\n";
   text += fmt::format(fmt::runtime(layout), "work", "pass", "particles", "1 thread",
                       fmt::format("{} threads", m.threads), "gain", "of FMA", "plain", "ratio",
                       "plain is fastest with");

@@ -50,6 +50,14 @@ void add_epochs(const BenchReport& report, std::vector<Goal>& goals) {
                      seconds, true});
     goals.push_back(
         {fmt::format("epoch_{}_mb", form), "  peak extra memory, MB", row->memory_mb, mb, true});
+    const std::string epoch = std::string("epoch ") + form;
+    const BenchRow& z = *report.all(epoch + " by z", "both").front();
+    const BenchRow& weights = *report.all(epoch + " by weights", "both").front();
+    goals.push_back({fmt::format("epoch_{}_weights_ratio", form),
+                     "  with gradients by the weights, over one without",
+                     std::max(weights.one / z.one, weights.all / z.all), 1.35, true});
+    goals.push_back({fmt::format("epoch_{}_weights_mb", form),
+                     "  memory that these add to its peak, MB", weights.memory_mb, 60, true});
   };
   add("published", 6, 300);
   add("isotropic", 1, 200);

@@ -17,7 +17,7 @@ void bench_laws(const BenchOptions& options, int threads, BenchReport& report);
 void bench_learned(const BenchOptions& options, int threads, BenchReport& report);
 /// Steps of a roll-out under a law that costs next to nothing, against ops/reference.
 void bench_mpm(const BenchOptions& options, int threads, BenchReport& report);
-/// The loss of a whole roll-out and its gradient by the latent, in both forms.
+/// The loss of a whole roll-out and its gradient by the latent, in both forms; then by the weights.
 void bench_epoch(const BenchOptions& options, int threads, BenchReport& report);
 /// Steps of training against the same objective in plain tensor operations.
 void bench_train(const BenchOptions& options, int threads, BenchReport& report);

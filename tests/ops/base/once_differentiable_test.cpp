@@ -85,12 +85,11 @@ INSTANTIATE_TEST_SUITE_P(
                }},
         OpCase{"learned_law", 3,
                [](const Tensor& F) {
-                 const auto weights =
-                     std::make_shared<kernels::LearnedLawWeights>(testing::random_weights(
-                         kernels::LawForm::isotropic, 5, 20, 2, kernels::Activation::silu, 7));
-                 return learned_law(weights, F, zeros3(),
-                                    torch::zeros({weights->latent_size}, torch::kFloat64))
-                     .tau;
+                 const LearnedNetworks networks =
+                     to_networks(testing::random_weights(kernels::LawForm::isotropic, 5, 20, 2,
+                                                         kernels::Activation::silu, 7),
+                                 torch::kFloat64);
+                 return learned_law(networks, F, zeros3(), torch::zeros({5}, torch::kFloat64)).tau;
                }},
         OpCase{"mlp", 2,
                [](const Tensor& x) {

@@ -15,6 +15,7 @@ std::vector<GradientRow> learned_law_rows() {
     rows.push_back({op, "F", errors.F});
     rows.push_back({op, "C", errors.C});
     rows.push_back({op, "z", errors.z});
+    rows.push_back({op, "weights", errors.weights});
   }
   return rows;
 }
@@ -51,6 +52,11 @@ std::vector<GradientRow> op_rows() {
       const std::string name = learned ? "z" : kernels::law_parameters(m.law.id)[k].name;
       // A gradient that is nothing at all must not pass for a right one.
       add(op, name, errors.sizes[k] > 0 ? errors.parameters[k] : INFINITY);
+    }
+    if (learned) {
+      add(op, "weights", rollout_weight_error(m));
+      if (m.law.weights->form == kernels::LawForm::isotropic)
+        add(op + ", networks of z alone", "weights", rollout_weight_error(of_z_alone(m)));
     }
   }
   return rows;

@@ -120,6 +120,103 @@ TEST(Rollout, SameBitsOnOneThreadAndOnTwo) {
   omp_set_num_threads(before);
 }
 
+std::vector<RolloutMaterial> learned_materials() {
+  std::vector<RolloutMaterial> all;
+  for (const RolloutMaterial& m : rollout_materials()) {
+    if (m.law.id != LawId::learned) continue;
+    all.push_back(m);
+    if (m.law.weights->form == kernels::LawForm::isotropic) all.push_back(of_z_alone(m));
+  }
+  return all;
+}
+
+class RolloutOfNetworks : public ::testing::TestWithParam<int> {
+ protected:
+  /// A roll-out of scene's particles, the first `cut` as a body of their own, with the same
+  /// networks.
+  static Tensor run(const RolloutScene& s, const RolloutMaterial& m,
+                    const LearnedNetworks& networks, const Tensor& z, std::int64_t cut = 0) {
+    RolloutBody body = s.body(m.law, z), other = body;
+    body.networks = other.networks = networks;
+    body.begin = other.end = cut;
+    std::vector<RolloutBody> bodies{body};
+    if (cut > 0) bodies.insert(bodies.begin(), other);
+    return rollout(s.x, s.v, s.C, s.F, s.mass, s.volume, bodies, s.settings).x;
+  }
+  static LearnedNetworks leaves(const RolloutMaterial& m, torch::ScalarType type) {
+    LearnedNetworks n = to_networks(*m.law.weights, type);
+    n.projection.numbers.requires_grad_();
+    n.stress.numbers.requires_grad_();
+    return n;
+  }
+};
+
+TEST_P(RolloutOfNetworks, WeightGradientsAgreeWithCentralDifferences) {
+  EXPECT_LE(rollout_weight_error(learned_materials()[GetParam()]), 1e-6);
+}
+
+TEST_P(RolloutOfNetworks, SameBitsTogetherApartAndOnOneThreadAndOnTwo) {
+  const RolloutMaterial m = learned_materials()[GetParam()];
+  const int before = omp_get_max_threads();
+  for (const auto type : {torch::kFloat32, torch::kFloat64}) {
+    RolloutScene scene = scene_of(m, type, 12);  // 27 chunks: running sums of two and of one
+    scene.settings.steps = 40;                   // more than a segment
+    scene.v.requires_grad_();
+    const Tensor z = m.parameters.clone().requires_grad_();
+    const LearnedNetworks n = leaves(m, type);
+    const std::vector<Tensor> all{scene.v, z, n.projection.numbers, n.stress.numbers};
+    const auto gradients = [&](const std::vector<Tensor>& of) {
+      return torch::autograd::grad({loss_of(run(scene, m, n, z))}, of);
+    };
+    omp_set_num_threads(1);
+    const auto one = gradients(all);
+    omp_set_num_threads(2);
+    const auto two = gradients(all);
+    for (std::size_t k = 0; k < all.size(); ++k) {
+      EXPECT_GT(one[k].abs().max().item<double>(), 0) << k;
+      EXPECT_TRUE(torch::equal(one[k], two[k])) << type << k;
+      EXPECT_TRUE(torch::equal(gradients({all[k]})[0], two[k])) << type << k;
+    }
+  }
+  omp_set_num_threads(before);
+}
+
+TEST_P(RolloutOfNetworks, BodiesThatShareThemAddTheirGradients) {
+  const RolloutMaterial m = learned_materials()[GetParam()];
+  const RolloutScene scene = scene_of(m);
+  const LearnedNetworks n = leaves(m, torch::kFloat64);
+  const auto gradients = [&](std::int64_t cut) {
+    return torch::autograd::grad({loss_of(run(scene, m, n, m.parameters, cut))},
+                                 {n.projection.numbers, n.stress.numbers});
+  };
+  const auto one = gradients(0), two = gradients(70);
+  for (const int k : {0, 1})
+    EXPECT_LE(((one[k] - two[k]).norm() / one[k].norm()).item<double>(), 1e-9) << k;
+}
+
+TEST_P(RolloutOfNetworks, OnlyWhatIsAskedForHasAGradient) {
+  const RolloutMaterial m = learned_materials()[GetParam()];
+  RolloutScene scene = scene_of(m);
+  scene.settings.steps = 5;
+  scene.settings.every = 5;
+  const LearnedNetworks both = leaves(m, torch::kFloat32);  // in a roll-out in float64
+  loss_of(run(scene, m, both, m.parameters)).backward();
+  EXPECT_EQ(both.stress.numbers.grad().scalar_type(), torch::kFloat32);
+  LearnedNetworks one = to_networks(*m.law.weights, torch::kFloat32);
+  one.stress.numbers.requires_grad_();
+  loss_of(run(scene, m, one, m.parameters)).backward();
+  EXPECT_FALSE(one.projection.numbers.grad().defined());
+  EXPECT_TRUE(torch::equal(one.stress.numbers.grad(), both.stress.numbers.grad()));
+  const LearnedNetworks none = to_networks(*m.law.weights, torch::kFloat64);
+  EXPECT_FALSE(run(scene, m, none, m.parameters).requires_grad());
+  // The same numbers by either way are the same roll-out.
+  EXPECT_TRUE(torch::equal(run(scene, m, none, m.parameters), scene.run(m.law, m.parameters).x));
+  const torch::NoGradGuard off;
+  EXPECT_FALSE(run(scene, m, both, m.parameters).requires_grad());
+}
+INSTANTIATE_TEST_SUITE_P(, RolloutOfNetworks, ::testing::Range(0, 3),
+                         [](const auto& info) { return learned_materials()[info.param].name; });
+
 TEST(Rollout, UndefinedGradientsStayUndefinedAndConstantsNeedNoTape) {
   RolloutScene scene;
   const LawDescription law = sample_law(LawId::elastic);
@@ -178,6 +275,13 @@ TEST(Rollout, ErrorsNameTheArgument) {
               HasSubstr("every >= 1"));
   EXPECT_THAT(message([](RolloutScene&, RolloutBody& b) { b.parameters = torch::ones({3}); }),
               HasSubstr("parameters of body 0: expected [2] Float on cpu, found [3] Float"));
+  const RolloutMaterial learned = learned_materials()[0];
+  EXPECT_EQ(message([&](RolloutScene&, RolloutBody& b) {
+              b.networks = to_networks(*learned.law.weights, torch::kFloat64);
+              b.networks.stress.numbers = b.networks.stress.numbers.slice(0, 1);
+            }),
+            "rollout: body 0: networks.stress.numbers: expected [616] Double on cpu, found [615] "
+            "Double on cpu");
   EXPECT_THAT(message([](RolloutScene&, RolloutBody& b) { b.end = 100; }),
               HasSubstr("bodies: expected the last one to end at particle 125, found 100"));
   EXPECT_THAT(message([](RolloutScene& s, RolloutBody&) { s.x = s.x + 0.4; }),

@@ -82,7 +82,7 @@ Gradients adjoint(const LawKernel<double>& law, const Particles& p) {
   for (Matrix& s : S) s *= 1e-4;
   std::vector<double> accumulator(std::size_t(law.accumulator_size()), 0.0);
   law.adjoint(std::ptrdiff_t(p.F.size()), 1e-4, view(p.F), view(p.C), view(p.G), view(S), view(g.F),
-              view(g.C), accumulator.data());
+              view(g.C), accumulator.data(), nullptr);
   law.parameter_gradient(accumulator.data(), g.z.data());
   return g;
 }
@@ -157,6 +157,7 @@ void expect_gradients(const LawDescription& d) {
         compare(p.C[k].data() + i, g.C[k].data()[i], 1e-3, of_C);
       }
     LawDescription moved = d;
+    int skipped = 0;
     for (int i = 0; i < 5; ++i) {
       const auto f = [&](double step) {
         moved.z[i] = d.z[i] + step;
@@ -165,7 +166,10 @@ void expect_gradients(const LawDescription& d) {
         return r;
       };
       const double fine = difference(f, 1e-5), coarse = difference(f, 3e-5);
-      if (std::abs(fine - coarse) > 1e-6 * std::abs(fine)) continue;
+      if (std::abs(fine - coarse) > 1e-6 * std::abs(fine)) {
+        ++skipped;
+        continue;
+      }
       of_z.add(g.z[i], fine);
     }
     EXPECT_LE(of_F.relative(), 1e-6);
@@ -173,6 +177,7 @@ void expect_gradients(const LawDescription& d) {
     EXPECT_LE(of_z.relative(), 1e-6);
     EXPECT_GT(of_z.norm, 0);
     EXPECT_LE(kinks, directions / 10);
+    EXPECT_LE(skipped, 1);
   }
 }
 
