@@ -106,8 +106,8 @@ class RolloutFunction : public torch::autograd::Function<RolloutFunction> {
  public:
   static variable_list forward(AutogradContext* ctx, const Tensor& x, const Tensor& v,
                                const Tensor& C, const Tensor& F, const Tensor& parameters,
-                               const Tensor& weights, const Tensor& mass, const Tensor& volume,
-                               const c10::intrusive_ptr<Plan>& plan) {
+                               const Tensor& /*weights: for the graph*/, const Tensor& mass,
+                               const Tensor& volume, const c10::intrusive_ptr<Plan>& plan) {
     const RolloutSettings& settings = plan->settings;
     const std::int64_t frames =
         kernels::Rollout<double>::frame_count(settings.steps, settings.every);

@@ -123,8 +123,7 @@ Measurer::Body rollout_epoch(const Observation& o, const kernels::LawDescription
     if (weights) leaves.push_back(*numbers);
   }
   return [=] {
-    const Tensor x =
-        ops::rollout(observed[0], v, {}, {}, mass, volume, {body}, settings).x;
+    const Tensor x = ops::rollout(observed[0], v, {}, {}, mass, volume, {body}, settings).x;
     for (const Tensor& gradient : torch::autograd::grad({(x - observed).square().mean()}, leaves)) {
       if (!gradient.isfinite().all().item<bool>())
         throw Error("bench: a gradient of the roll-out with random weights is not finite");
@@ -149,8 +148,9 @@ void bench_weights(const Observation& o, kernels::LawForm form, const BenchOptio
   measurer.run({static_cast<int>(options.epoch_rounds), 0, 1e9});
   for (const bool weights : {false, true}) {
     const std::string name = weights ? "weights" : "z";
-    BenchRow row = make_row(measurer, name, std::string("epoch ") + kernels::form_name(form) +
-                            " by " + name, "both", o.particles, 1);
+    BenchRow row =
+        make_row(measurer, name, std::string("epoch ") + kernels::form_name(form) + " by " + name,
+                 "both", o.particles, 1);
     row.memory_mb = weights ? std::max(0.0, added[1] - added[0]) : added[0];
     report.rows.push_back(row);
   }

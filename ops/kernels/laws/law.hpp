@@ -44,9 +44,9 @@ class LawKernel {
   virtual void evaluate(std::ptrdiff_t count, T dt, View<const T> F_trial, View<const T> C,
                         View<T> F_proj, View<T> tau) const = 0;
 
-  /// The adjoint of evaluate: given dL/dF_proj and dL/dtau, overwrites grad_F_trial, adds to grad_C,
-  /// to accumulator and to weight_sums (all three may be null; weight_sums aligned to 64 bytes).
-  /// grad_F_trial may be the same memory as grad_F_proj.
+  /// The adjoint of evaluate: given dL/dF_proj and dL/dtau, overwrites grad_F_trial, adds to
+  /// grad_C, to accumulator and to weight_sums (all three may be null; weight_sums aligned to 64
+  /// bytes). grad_F_trial may be the same memory as grad_F_proj.
   virtual void adjoint(std::ptrdiff_t count, T dt, View<const T> F_trial, View<const T> C,
                        View<const T> grad_F_proj, View<const T> grad_tau, View<T> grad_F_trial,
                        View<T> grad_C, T* accumulator, T* weight_sums = nullptr) const = 0;

@@ -87,8 +87,7 @@ class LearnedLawKernel final : public LawKernel<T> {
       rest_stress_ = at_rest(law_.stress);
       law_.rest_cap = std::min(rest_projection_[kTile], T(0));
       law_.rest_pressure = rest_stress_[kTile];
-      if (packed_->projection_ignores_state)
-        law_.constant_projection = rest_projection_.data();
+      if (packed_->projection_ignores_state) law_.constant_projection = rest_projection_.data();
       if (packed_->stress_ignores_state) law_.constant_stress = rest_stress_.data();
     }
   }

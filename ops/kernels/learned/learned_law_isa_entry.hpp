@@ -24,7 +24,8 @@ void learned_evaluate(const LearnedLaw<T>& law, std::ptrdiff_t count, View<const
 template <class T>
 void learned_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, View<const T> F_trial,
                      View<const T> C, View<const T> grad_F_proj, View<const T> grad_tau,
-                     View<T> grad_F_trial, View<T> grad_C, T* accumulator, T* weight_sums, T* scratch) {
+                     View<T> grad_F_trial, View<T> grad_C, T* accumulator, T* weight_sums,
+                     T* scratch) {
   if (law.form == LawForm::isotropic)
     isotropic_adjoint(law, count, F_trial, C, grad_F_proj, grad_tau, grad_F_trial, grad_C,
                       accumulator, weight_sums, scratch);

@@ -58,8 +58,7 @@ struct LearnedLawTable {
   /// LawKernel::adjoint of at most kTile particles; grad_F_proj and grad_tau must be given.
   void (*adjoint)(const LearnedLaw<T>&, std::ptrdiff_t count, View<const T> F_trial,
                   View<const T> C, View<const T> grad_F_proj, View<const T> grad_tau,
-                  View<T> grad_F_trial, View<T> grad_C, T* accumulator, T* weight_sums,
-                  T* scratch);
+                  View<T> grad_F_trial, View<T> grad_C, T* accumulator, T* weight_sums, T* scratch);
   /// A bare network on one tile of planes: in [padded(in), kTile] → [padded(out), kTile] in
   /// `scratch` of forward_scratch() numbers.
   const T* (*mlp_forward)(const PackedMlp<T>&, const T* in, T* scratch);

@@ -76,7 +76,8 @@ struct LearnedLawWeights {
 
   /// The networks as the kernels read them (packed_networks.hpp), packed in the first call and
   /// shared by the laws of all z. Weights that a law was made of must not change
-  /// any more; their copies may. Safe to call from several threads. Throws Error where check() does.
+  /// any more; their copies may. Safe to call from several threads. Throws Error where check()
+  /// does.
   template <class T>
   std::shared_ptr<const PackedNetworks<T>> packed() const;
   mutable PackedNetworksCache packed_networks = {};
@@ -106,6 +107,6 @@ inline constexpr double kInvariantSmoothing = 0.05;  ///< d: rounds the kink of 
 inline constexpr double kSinhLimit = 12;             ///< of outputs whose sinh is a coefficient
 inline constexpr double kLeastViscosity = -0.2;  ///< of sinh(η̃)/b̄: the share is at most 1.25
 inline constexpr double kExponentLimit = 4;  ///< of outputs that are exponents of strain measures
-inline constexpr double kFluidCap = -0.5;  ///< c₁ below which a material has no strength at all
+inline constexpr double kFluidCap = -0.5;    ///< c₁ below which a material has no strength at all
 
 }  // namespace uniphy::kernels

@@ -102,8 +102,8 @@ class FoldedMlp {
 
   const PackedMlp<T>& mlp() const { return mlp_; }
   const PackedMlpStorage<T>& packed() const { return *packed_; }
-  /// PackedMlpStorage::add_weight_gradient with the latent's part of the first weight, g zᵀ, g being
-  /// the gradient of the first bias.
+  /// PackedMlpStorage::add_weight_gradient with the latent's part of the first weight, g zᵀ, g
+  /// being the gradient of the first bias.
   void add_weight_gradient(const T* sums, T* gradient) const;
 
  private:

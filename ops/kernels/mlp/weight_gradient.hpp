@@ -54,8 +54,7 @@ inline void add_outer_products(const T* g, const T* x, std::ptrdiff_t stride, T*
 /// `in` hold does not matter. sums: weight_sums_of_layer(in, out) numbers, aligned to 64 bytes;
 /// turned: [kTile, weight_stride(in)], scratch.
 template <class T>
-inline void tile_weight_gradient(int out, int in, const T* g, const T* x, T* turned,
-                                 T* sums) {
+inline void tile_weight_gradient(int out, int in, const T* g, const T* x, T* turned, T* sums) {
   constexpr int w = width_of<Lanes<T>>;
   // 16 sums of a 32-register file, 8 of a 16-register one.
   constexpr int kOut = w * sizeof(T) >= 64 ? 8 : 4;

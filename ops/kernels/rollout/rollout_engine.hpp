@@ -110,7 +110,7 @@ class RolloutEngine {
 
   /// The chunks of a body are dealt, in order, to this many running sums of its weights; 0: none.
   std::vector<int> sum_count_;
-  std::vector<std::ptrdiff_t> sum_start_;         ///< of the first one of a body
+  std::vector<std::ptrdiff_t> sum_start_;  ///< of the first one of a body
   AlignedBuffer<T> weight_sums_{0, Pages::huge};
   std::vector<std::vector<double>> weight_sum_;
 };

@@ -34,7 +34,8 @@ void RolloutEngine<T>::want_weights(const std::vector<bool>& bodies) {
   for (int b = 0; b < order_.bodies(); ++b) {
     const std::ptrdiff_t n = order_.first_chunk(b + 1) - order_.first_chunk(b);
     const bool wanted = !bodies.empty() && bodies[b] && n > 0;
-    sum_count_[b] = wanted ? static_cast<int>(std::clamp<std::ptrdiff_t>(n / 2, 1, kWeightSums)) : 0;
+    sum_count_[b] =
+        wanted ? static_cast<int>(std::clamp<std::ptrdiff_t>(n / 2, 1, kWeightSums)) : 0;
     sum_start_[b] = size;
     if (!wanted) continue;
     weight_sum_[b].assign(rollout_.bodies()[b].law->weight_sums_size(), 0.0);
