@@ -117,26 +117,39 @@ class Gradients(unittest.TestCase):
                 F, networks = deformations(3, 0.2), random_networks(form, 5)
                 scale = ops.learned_law(F, C, z, **networks)[1].abs().max()
 
-                def law(F, C, z):
-                    F_proj, tau = ops.learned_law(F, C, z, **networks)
+                weights = networks.pop("projection"), networks.pop("stress")
+
+                def law(F, C, z, projection, stress):
+                    F_proj, tau = ops.learned_law(F, C, z, projection=projection, stress=stress,
+                                                  **networks)
                     return F_proj, tau / scale
 
-                self.check(law, F, C, z)
-                self.check(lambda F, z: ops.learned_project(F, z, **networks), F, z)
-                self.check(lambda F, C, z: ops.learned_stress(F, C, z, **networks) / scale, F, C, z)
+                def project(F, z, projection):
+                    return ops.learned_project(F, z, projection=projection, stress=weights[1],
+                                               **networks)
+
+                def stress(F, C, z, stress):
+                    return ops.learned_stress(F, C, z, projection=weights[0], stress=stress,
+                                              **networks) / scale
+
+                self.check(law, F, C, z, *weights)
+                self.check(project, F, z, weights[0])
+                self.check(stress, F, C, z, weights[1])
 
     def test_rollout(self):
         torch.manual_seed(7)
         x = 0.35 + 0.3 * torch.rand(6, 3, dtype=torch.float64)
         networks = random_networks("isotropic", 4)
         inputs = (x, normal(6, 3), normal(6, 3, 3), deformations(6, 0.1),
-                  torch.tensor([4e3, 6e3], dtype=torch.float64).log(), normal(4, scale=0.3))
+                  torch.tensor([4e3, 6e3], dtype=torch.float64).log(), normal(4, scale=0.3),
+                  networks.pop("projection"), networks.pop("stress"))
         volume = torch.full((6,), 1e-3, dtype=torch.float64)
 
-        def roll(x0, v0, C0, F0, elastic, z):
+        def roll(x0, v0, C0, F0, elastic, z, projection, stress):
             x, v = ops.rollout(x0, v0, 1e3 * volume, volume, ["elastic", "learned"],
                                [elastic.exp(), z], steps=6, every=2, velocities=True, C0=C0, F0=F0,
-                               sizes=[4, 2], **networks, n=8, dt=2e-4, bound=2)
+                               sizes=[4, 2], projection=projection, stress=stress, **networks,
+                               n=8, dt=2e-4, bound=2)
             return x, v
 
         self.check(roll, *inputs)

@@ -27,6 +27,8 @@ class Bits(unittest.TestCase):
                     with self.subTest(f"{dtype} {materials[code]}"):
                         expected = found_by_cpp(observation, code, str(dtype).split(".")[1])
                         z = codes[code].to(dtype).requires_grad_()
+                        for name in ("projection", "stress"):
+                            networks[name] = networks[name].detach().requires_grad_()
                         x, v0, mass, volume = (
                             seen[k].to(dtype) for k in ("x", "v0", "mass", "volume"))
                         frames, _ = ops.rollout(x[0], v0, mass, volume, ["learned"], [z],
@@ -37,6 +39,9 @@ class Bits(unittest.TestCase):
                         self.assertEqual([loss.item()], expected["loss"])
                         self.assertEqual(z.grad.tolist(), expected["z"])
                         self.assertTrue(all(g != 0 for g in expected["z"]))
+                        for name in ("projection", "stress"):
+                            self.assertEqual(networks[name].grad.tolist(), expected[name])
+                            self.assertTrue(any(g != 0 for g in expected[name]))
 
 
 if __name__ == "__main__":

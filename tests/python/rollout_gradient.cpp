@@ -1,8 +1,9 @@
 // What Python has to find to the bit: the loss of a roll-out of a trained law against an
 // observation and its gradient, from the same op in C++.
 //   uniphy_rollout_gradient MODEL OBSERVATION CODE float32|float64 EPOCHS
-// Prints the loss and the gradient by z, hexadecimal, then, where EPOCHS > 0, the seconds of the
-// fastest of so many epochs of Algorithm 2 (roll-out, loss, gradient by z, step of Adam).
+// Prints the loss and the gradients by z and by the numbers of the networks, hexadecimal, then,
+// where EPOCHS > 0, the seconds of the fastest of so many epochs of Algorithm 2 (roll-out, loss,
+// gradient by z, step of Adam).
 
 #include <torch/torch.h>
 
@@ -90,10 +91,18 @@ int main(int argc, char** argv) {
     const auto dtype = std::string(argv[4]) == "float64" ? torch::kFloat64 : torch::kFloat32;
     uniphy::Problem problem(uniphy::read_model(argv[1]), uniphy::read_observation(argv[2]),
                             std::stol(argv[3]), dtype);
+    torch::Tensor& projection = problem.networks.projection.numbers;
+    torch::Tensor& stress = problem.networks.stress.numbers;
+    projection.requires_grad_();
+    stress.requires_grad_();
     const torch::Tensor loss = problem.loss();
     loss.backward();
     uniphy::print("loss", loss);
     uniphy::print("z", problem.z.grad());
+    uniphy::print("projection", projection.grad());
+    uniphy::print("stress", stress.grad());
+    projection.requires_grad_(false);
+    stress.requires_grad_(false);
     const int epochs = std::stoi(argv[5]);
     if (epochs > 0) std::printf("seconds %.6g\n", uniphy::fastest_epoch(problem, epochs));
   } catch (const std::exception& error) {
