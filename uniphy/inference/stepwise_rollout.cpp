@@ -31,19 +31,21 @@ ops::LawOutput law_of(const ops::RolloutBody& body, const Tensor& F, const Tenso
   const Tensor z =
       (body.parameters.defined() ? body.parameters : torch::tensor(body.law.z, torch::kFloat64))
           .to(F.dtype());
-  const ops::LearnedNetworks networks = body.networks.defined()
-                                            ? body.networks
-                                            : ops::to_networks(*body.law.weights, torch::kFloat64);
-  const Tensor F_proj = ops::learned_project(networks, F, z);  // lines 7-9: SVD, Δ = g(F), F + Δ
-  return {F_proj, ops::learned_stress(networks, F_proj, C, z)};  // lines 10-12: SVD, R, f, Ŝ
+  const Tensor F_proj = ops::learned_project(body.networks, F, z);  // lines 7-9: SVD, g(F), F + Δ
+  return {F_proj, ops::learned_stress(body.networks, F_proj, C, z)};  // lines 10-12: SVD, R, f, Ŝ
 }
 
 }  // namespace
 
 ops::RolloutFrames stepwise_rollout(const Tensor& x0, const Tensor& v0, const Tensor& C0,
                                     const Tensor& F0, const Tensor& mass, const Tensor& volume,
-                                    const std::vector<ops::RolloutBody>& bodies,
+                                    const std::vector<ops::RolloutBody>& given,
                                     const ops::RolloutSettings& settings) {
+  std::vector<ops::RolloutBody> bodies = given;
+  for (ops::RolloutBody& body : bodies) {
+    if (body.law.weights && !body.networks.defined())
+      body.networks = ops::to_networks(*body.law.weights, torch::kFloat64);
+  }
   const kernels::GridSettings& grid = settings.grid;
   Tensor x = x0, v = v0;
   Tensor C = C0.defined() ? C0 : torch::zeros({x.size(0), 3, 3}, x.options());

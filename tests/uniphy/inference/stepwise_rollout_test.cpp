@@ -22,24 +22,16 @@ struct Differentiated {
   ops::RolloutFrames frames;
 
   Differentiated(const RolloutMaterial& m, bool stepwise) {
-    RolloutScene scene;
+    RolloutScene scene = testing::scene_of(m);
     scene.settings.velocities = true;
-    if (m.name == "published") {
-      // The published form is not smooth where singular values meet: start with some apart.
-      scene.F = torch::diag(torch::tensor({1.2, 1.0, 0.8}, torch::kFloat64))
-                    .repeat({scene.x.size(0), 1, 1});
-    }
     ops::RolloutBody body = scene.body(m.law, m.parameters.clone());
     if (m.law.id == kernels::LawId::learned) {
       body.networks = ops::to_networks(*m.law.weights, torch::kFloat64);
+      leaves = {body.networks.projection.numbers, body.networks.stress.numbers};
+      names = {"weights of the projection", "weights of the stress"};
     }
-    leaves = {scene.x, scene.v, scene.C, scene.F, body.parameters};
-    names = {"x", "v", "C", "F", "parameters"};
-    if (body.networks.defined()) {
-      leaves.push_back(body.networks.projection.numbers);
-      leaves.push_back(body.networks.stress.numbers);
-      names.insert(names.end(), {"weights of the projection", "weights of the stress"});
-    }
+    leaves.insert(leaves.end(), {scene.x, scene.v, scene.C, scene.F, body.parameters});
+    names.insert(names.end(), {"x", "v", "C", "F", "parameters"});
     for (Tensor& leaf : leaves) leaf.requires_grad_();
     frames = (stepwise ? stepwise_rollout : ops::rollout)(
         scene.x, scene.v, scene.C, scene.F, scene.mass, scene.volume, {body}, scene.settings);
