@@ -50,30 +50,27 @@ class Isotropic(Law):
         d = torch.clamp(delta * x, min=-self.ARGUMENT_LIMIT, max=self.ARGUMENT_LIMIT)
         return x * torch.exp(d) * self.sinhc(y)
 
-    # Of the pairs i < j: (exp x_i - exp x_j)/(x_i - x_j).
+    # Of the pairs i < j, to rounding at any gap: (exp x_i - exp x_j)/(x_i - x_j).
     def exp_divided(self, x: Tensor) -> Tensor:
-        a = self.left(x)
-        b = self.right(x)
-        return torch.exp(0.5 * (a + b)) * self.sinhc(0.5 * (a - b))
+        d = self.left(x) - self.right(x)
+        apart = d != 0.0
+        one = torch.ones_like(d)
+        d = torch.where(apart, d, one)
+        return torch.exp(self.right(x)) * torch.where(apart, torch.expm1(d) / d, one)
 
-    # (eps_i - eps_j)/(sigma_i - sigma_j), eps = log max(sigma, MINIMUM_STRETCH): between the
-    # stretches 2 atanh(r)/r/(a + b), r = (a - b)/(a + b), whose seven terms reach 1e-16 below 0.1.
+    # (eps_i - eps_j)/(sigma_i - sigma_j), eps = log max(sigma, MINIMUM_STRETCH).
     def strain_divided(self, sigma: Tensor) -> Tensor:
         stretch = torch.clamp(sigma, min=self.MINIMUM_STRETCH)
-        a = self.left(stretch)
         b = self.right(stretch)
-        one = torch.ones_like(a)
-        r = (a - b) / (a + b)
-        r2 = r * r
-        series = 1.0 + r2 * (1.0 / 3.0 + r2 * (1.0 / 5.0 + r2 * (1.0 / 7.0 + r2 * (
-            1.0 / 9.0 + r2 * (1.0 / 11.0 + r2 * (1.0 / 13.0 + r2 / 15.0))))))
-        near = torch.abs(r) < 0.1
-        far = (torch.log(a) - torch.log(b)) / torch.where(near, one, a - b)
-        of_stretch = torch.where(near, 2.0 / (a + b) * series, far)
+        d = (self.left(stretch) - b) / b
+        apart = d != 0.0
+        one = torch.ones_like(d)
+        d = torch.where(apart, d, one)
+        of_stretch = torch.where(apart, torch.log1p(d) / d, one) / b
         # (stretch_i - stretch_j)/(sigma_i - sigma_j) is 1 above the clamp and 0 below it.
         gap = self.left(sigma) - self.right(sigma)
-        apart = torch.abs(gap) > 0.0
-        ratio = torch.where(apart, (a - b) / torch.where(apart, gap, one), torch.zeros_like(a))
+        apart = gap != 0.0
+        ratio = (self.left(stretch) - b) / torch.where(apart, gap, one)
         clamped = self.right(sigma) < self.MINIMUM_STRETCH
         return of_stretch * torch.where(clamped, ratio, one)
 

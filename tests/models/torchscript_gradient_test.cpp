@@ -119,9 +119,10 @@ class ScriptGradient : public ::testing::TestWithParam<Case> {
     };
   }
   Loss kernel_loss(bool stress) const {
-    return [stress, this](const Tensor& F, const Tensor& C, const Tensor& z) {
-      return (weight_ * (stress ? ops::learned_stress(weights_, F, C, z)
-                                : ops::learned_project(weights_, F, z)))
+    const ops::LearnedNetworks networks = ops::to_networks(*weights_, torch::kFloat64);
+    return [stress, networks, this](const Tensor& F, const Tensor& C, const Tensor& z) {
+      return (weight_ * (stress ? ops::learned_stress(networks, F, C, z)
+                                : ops::learned_project(networks, F, z)))
           .sum();
     };
   }
