@@ -42,13 +42,14 @@ std::string methods(const std::string& file) {
   return text + "\n";
 }
 
-/// def NAME_network(self, x): the layers one after the other.
+/// def NAME_network(self, x): the layers one after the other. By addmm: the backward of linear is
+/// fused with that of the activation by LibTorch 2.6, which then compiles for minutes.
 std::string network(const std::string& name, std::size_t depth, Activation activation) {
   std::string text = "def " + name + "_network(self, x: Tensor) -> Tensor:\n";
   for (std::size_t k = 0; k < depth; ++k) {
     const std::string n = std::to_string(k);
-    text += "    x = torch.linear(x, self." + name + "_weight_" + n + ", self." + name + "_bias_" +
-            n + ")\n";
+    text += "    x = torch.addmm(self." + name + "_bias_" + n + ", x, self." + name + "_weight_" +
+            n + ".t())\n";
     if (k + 1 == depth) break;
     if (activation == Activation::gelu)
       text += "    x = torch.gelu(x)\n";
@@ -79,6 +80,7 @@ std::map<std::string, double> script_constants(bool single_precision) {
           {"ARGUMENT_LIMIT", kernels::kArgumentLimit},
           {"FLUID_CAP", kernels::kFluidCap},
           {"MINIMUM_STRETCH", kernels::kMinimumStretch},
+          {"LEAST_SUM", kernels::kLeastSum},
           {"FACTOR_FLOOR", single_precision ? 1e-3 : 1e-6},  // svd3_adjoint's
           {"EPSILON", epsilon},
           {"TINY", tiny}};

@@ -26,9 +26,10 @@ class Eager(torch.nn.Module):
     SINH_LIMIT: float
     LEAST_VISCOSITY: float
     EXPONENT_LIMIT: float
-    ARGUMENT_LIMIT: float
     FLUID_CAP: float
-    MINIMUM_STRETCH: float  # ops/kernels/spectral/limits.hpp
+    ARGUMENT_LIMIT: float  # these three: ops/kernels/spectral/limits.hpp
+    MINIMUM_STRETCH: float
+    LEAST_SUM: float
     FACTOR_FLOOR: float  # ops/kernels/spectral/svd3.hpp, svd3_adjoint
     EPSILON: float  # of the law's dtype
     TINY: float  # its least normal number

@@ -117,8 +117,8 @@ class Law(Eager):
                              below[:, 1:3], zero])
         return rows.reshape(above.size(0), 3, 3)
 
-    # 1/(sigma_i + sigma_j), the sum bounded away from zero by 1e-5 (inverse_sum, spectral.hpp).
+    # 1/(sigma_i + sigma_j), the sum bounded away from zero (inverse_sum, spectral.hpp).
     def inverse_sum(self, sigma: Tensor) -> Tensor:
         total = self.left(sigma) + self.right(sigma)
-        magnitude = torch.clamp(torch.abs(total), min=1e-5)
+        magnitude = torch.clamp(torch.abs(total), min=self.LEAST_SUM)
         return 1.0 / torch.where(total < 0.0, -magnitude, magnitude)

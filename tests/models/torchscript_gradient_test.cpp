@@ -181,7 +181,8 @@ TEST_P(ScriptGradient, IsTheKernelsEverywhere) {
   // published form is another one with each. These have the same U and V here and there.
   if (GetParam().form == LawForm::published) {
     states = apart_states();
-    for (const State& s : singular_states()) states.push_back(s);
+    for (const State& s : singular_states())
+      if (s.name != "rank 1") states.push_back(s);  // two singular values of 0
     for (const State& s :
          {State{"I", diagonal(1, 1, 1)}, State{"1.3 I", diagonal(1.3, 1.3, 1.3)},
           State{"R about z", about_z(0.7)}, State{"0.8 R about x", 0.8 * about_x(-0.3)},

@@ -359,7 +359,7 @@ TEST_F(ScriptLawErrors, UnwritableFile) {
   EXPECT_THAT(message_of([this] {
                 save_script_law(file("no/such/directory/law.pt"), small(), torch::kFloat64);
               }),
-              HasSubstr("law.pt: cannot write"));
+              HasSubstr("law.pt: cannot be written: No such file or directory"));
 }
 
 TEST_F(ScriptLawErrors, WrongArgumentsNameThemselves) {

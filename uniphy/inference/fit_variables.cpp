@@ -22,11 +22,11 @@ torch::Tensor to_tensor(const std::vector<double>& numbers) {
 class LatentFitVariables : public FitVariables {
  public:
   explicit LatentFitVariables(const ModelFile& file) {
+    if (file.codes() == 0) throw Error("model: expected latent codes to start from, found none");
     const models::TrainedModel model = models::trained_model(file, torch::kFloat64);
     law_ = model.law->frozen();
     materials_ = model.codes->materials();
     const auto codes = static_cast<int>(materials_.size());
-    if (codes == 0) throw Error("model: expected latent codes to start from, found none");
     const torch::Tensor z = model.codes->z.detach();
     mean_ = z.mean(0);
     const torch::Tensor spread = z.std(0, /*unbiased=*/false);
