@@ -1,7 +1,7 @@
 // uniphy_export: a trained model for other programs.
 //   uniphy_export configs/export/unified.yaml --out out/export
-//   python3 -c "import torch; m = torch.jit.load('out/export/law.pt');
-//               print(m.project(torch.eye(3)[None], torch.zeros(m.latent_size)))"
+//   python3 -c "import torch; m = torch.jit.load('out/export/law.pt')
+//   print(m.project(1.1 * torch.eye(3)[None], m.code_of('sand')))"
 
 #include <algorithm>
 #include <string>
@@ -59,8 +59,8 @@ int main(int argc, char** argv) {
       "answers.",
       {"CONFIG.yaml         the model and the dtype",
        "model.h5            a model of uniphy_train (layout: uniphy/io/model_file.hpp)"},
-      {"DIR/law.pt          TorchScript with project(F, z) and stress(F_proj, C, z) (layout: "
-       "models/torchscript.hpp)",
+      {"DIR/law.pt          TorchScript with project(F, z), stress(F_proj, C, z), differentiable, "
+       "and the training codes with their materials (layout: models/torchscript.hpp)",
        "DIR/weights.h5      the same numbers (layout: uniphy/io/model_file.hpp)"},
       {"uniphy_export configs/export/unified.yaml --set dtype=float32 --out out/export"}};
   return uniphy::run_experiment(

@@ -3,7 +3,7 @@
 // A trained law as a TorchScript file that runs without this project, in C++ and in Python:
 //
 //   python3 -c "import torch; m = torch.jit.load('law.pt'); z = m.code_of('sand')
-//               F = torch.eye(3)[None].requires_grad_(); print(m.project(F, z).sum().backward())"
+//   F = torch.eye(3)[None].requires_grad_(); m.project(F, z).sum().backward(); print(F.grad)"
 //
 //   methods     project(F, z) → F_proj and stress(F_proj, C, z) → tau; F, F_proj, C [P, 3, 3],
 //               P ≥ 0, z [latent_size] or [P, latent_size], float32 or float64, finite; anything

@@ -26,7 +26,9 @@ def central_difference(f, x, h=2e-5):
 
 
 def difference(a, b):
-    return ((a - b).norm() / b.norm()).item() if b.norm() > 0 else a.norm().item()
+    """Relative; of what is zero but for rounding, the difference itself."""
+    scale = b.norm().item()
+    return (a - b).norm().item() / (scale if scale > 1e-3 else 1)
 
 
 def check_gradients(law, F, C, z):
@@ -108,4 +110,5 @@ def main():
     print("{}, {}: torch {}".format(sys.argv[1], law.form, torch.__version__))
 
 
-main()
+if __name__ == "__main__":
+    main()
