@@ -8,9 +8,9 @@ packages=(
   libhdf5-dev libyaml-cpp-dev nlohmann-json3-dev
   libcli11-dev libspdlog-dev libfmt-dev
   libgtest-dev libgmock-dev libbenchmark-dev
-  python3-torch python3-numpy python3-mpmath pyflakes3  # tests of what a user in Python meets
   gnuplot-nox  # the charts and pictures of the reports
   python3-torch python3-h5py  # torch.ops.uniphy in tests/python, experiments/algorithm2.py
+  python3-numpy python3-mpmath pyflakes3  # coefficients of the activations, lint of Python files
 )
 
 if ! command -v apt-get >/dev/null || ! command -v dpkg-query >/dev/null; then
