@@ -41,6 +41,7 @@
 #include <string>
 #include <vector>
 
+#include "ops/kernels/laws/law_parameters.hpp"
 #include "ops/kernels/learned/learned_law_weights.hpp"
 
 namespace uniphy::models {
@@ -50,9 +51,16 @@ inline constexpr std::int64_t kScriptVersion = 2;
 inline constexpr const char* kScriptUnits = "F: 1, C: 1/s, z: 1, tau: Pa";
 
 /// The columns of material_parameters; a newtonian law's mu is in Pa s.
-inline constexpr std::array<const char*, 5> kScriptParameterNames{"mu", "lambda", "tau_y", "theta",
-                                                                  "eta"};
-inline constexpr std::array<const char*, 5> kScriptParameterUnits{"Pa", "Pa", "Pa", "rad", "Pa s"};
+inline constexpr auto kScriptParameterNames = [] {
+  std::array<const char*, kernels::kLawParameters> names{};
+  for (const auto& p : kernels::kLawParameterTable) names[p.place] = p.name;
+  return names;
+}();
+inline constexpr auto kScriptParameterUnits = [] {
+  std::array<const char*, kernels::kLawParameters> units{};
+  for (const auto& p : kernels::kLawParameterTable) units[p.place] = p.unit;
+  return units;
+}();
 
 /// The training codes that a file carries; none by default.
 struct ScriptCodes {
