@@ -39,8 +39,8 @@ class Errors(unittest.TestCase):
              "learned_project: projection: expected [108] Double on cpu, found [5] Double on cpu"),
             (lambda: ops.learned_stress(F, F, z, **dict(networks, stress_widths=[11])),
              "learned_stress: stress_widths: expected two or more, found 1"),
-            (lambda: ops.learned_law(F, F, z[:4], **networks), "projection/layer_0: expected 7 "
-             "inputs (features and latent), found 8"),
+            (lambda: ops.learned_law(F, F, z[:4], **networks), "projection.widths: expected "
+             "[7, ..., 4] (features and latent first, outputs last), found [8, 8, 4]"),
             (lambda: rollout(["learned"], [z]),
              "rollout: a body is learned: expected form, activation, projection_widths, "),
             (lambda: rollout(["elastic", "sand"]), "rollout: expected as many laws as parameters "

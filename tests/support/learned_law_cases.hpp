@@ -84,7 +84,7 @@ inline LearnedLawErrors learned_law_errors(kernels::LawForm form) {
         ((of_projection * g[3]).sum() + (of_stress * g[4]).sum()).reshape({1});
     keep(errors.weights,
          smooth_gradient_error(
-             along, torch::zeros({1}, torch::kFloat64), 1e-4, [&](const torch::Tensor& t) {
+             along, torch::zeros({1}, torch::kFloat64), 1e-6, [&](const torch::Tensor& t) {
                law.projection.numbers = of_case.projection.numbers + t * of_projection;
                law.stress.numbers = of_case.stress.numbers + t * of_stress;
                return loss(F, C, z);
