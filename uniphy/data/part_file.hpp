@@ -23,8 +23,8 @@ std::filesystem::path part_path(const std::filesystem::path& directory, std::int
 
 /// Written under a temporary name first and sealed (seal.hpp): a part is whole or not there.
 void write_part(const std::filesystem::path& file, const TrajectoryPart& part);
-/// Nothing where there is no such file. Throws Error for a file that is no part, is damaged, or holds
-/// numbers that are not finite.
+/// Nothing where there is no such file. Throws Error for a file that is no part, is damaged, or
+/// holds numbers that are not finite.
 std::optional<TrajectoryPart> read_part(const std::filesystem::path& file);
 
 }  // namespace uniphy
