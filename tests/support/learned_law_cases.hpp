@@ -38,7 +38,7 @@ double smooth_gradient_error(const torch::Tensor& gradient, const torch::Tensor&
   return (error.norm() / fine.masked_select(smooth).norm()).item<double>();
 }
 
-/// A law with random weights. the published form sees the factors of F, which have a derivative
+/// A law with random weights. The published form sees the factors of F, which have a derivative
 /// only where the singular values are apart: the other cases are left out.
 inline LearnedLawErrors learned_law_errors(kernels::LawForm form) {
   const auto weights = random_weights(form, 5, 20, 2, kernels::Activation::gelu, 7);

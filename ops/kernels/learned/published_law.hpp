@@ -4,7 +4,7 @@
 #include "ops/kernels/mlp/mlp.hpp"
 #include "ops/kernels/spectral/spectral.hpp"
 
-// the published form of the learned law, as published (UniPhy, supplementary, Algorithms 1 and 2):
+// The published form of the learned law, as published (UniPhy, supplementary, Algorithms 1 and 2):
 //   projection  Δ = g_φ(F, U, Σ, Vᵀ, z),  F_proj = F + Δ
 //   stress      S₁ = f_θ(Σ, FᵀF, J, log J, F_max, log F_max, RᵀCR t₀, z) of the projected F,
 //               F_max = max(F₀₀, 1e-6),  R = U Vᵀ,  τ = s R ½(S₁ + S₁ᵀ) Rᵀ
@@ -22,11 +22,11 @@ std::ptrdiff_t published_scratch(const LearnedLaw<T>& law) {
 }
 
 template <class T>
-struct SeedTile {
+struct PublishedTile {
   T *projection_in, *stress_in, *grad_projection, *grad_stress, *grad_features;
   T* rotations;  ///< U and V of the projected F; its Σ is in stress_in
   T *tape, *stress_tape;
-  SeedTile(const LearnedLaw<T>& law, T* scratch) {
+  PublishedTile(const LearnedLaw<T>& law, T* scratch) {
     projection_in = scratch;
     stress_in = projection_in + 32 * kTile;
     grad_features = stress_in + 28 * kTile;
@@ -38,7 +38,7 @@ struct SeedTile {
   }
 };
 
-namespace seed_detail {
+namespace published_detail {
 
 template <class V, class T>
 UNIPHY_INLINE void put(T* planes, int row, std::ptrdiff_t l, const V& value) {
@@ -55,9 +55,10 @@ UNIPHY_INLINE Mat3<V> get3(const T* planes, int row, std::ptrdiff_t l) {
   return m;
 }
 
-/// The decompositions that seed_tile_forward has left: of F from projection_in, of the projected F.
+/// The decompositions that published_tile_forward has left: of F from projection_in, of the
+/// projected F.
 template <class V, class T>
-UNIPHY_INLINE Svd3<V> trial_svd(const SeedTile<T>& tile, std::ptrdiff_t l) {
+UNIPHY_INLINE Svd3<V> trial_svd(const PublishedTile<T>& tile, std::ptrdiff_t l) {
   Svd3<V> s;
   s.U = get3<V>(tile.projection_in, 9, l);
   for (int i = 0; i < 3; ++i)
@@ -66,7 +67,7 @@ UNIPHY_INLINE Svd3<V> trial_svd(const SeedTile<T>& tile, std::ptrdiff_t l) {
   return s;
 }
 template <class V, class T>
-UNIPHY_INLINE Svd3<V> projected_svd(const SeedTile<T>& tile, std::ptrdiff_t l) {
+UNIPHY_INLINE Svd3<V> projected_svd(const PublishedTile<T>& tile, std::ptrdiff_t l) {
   Svd3<V> s;
   s.U = get3<V>(tile.rotations, 0, l);
   for (int i = 0; i < 3; ++i) s.sigma[i] = V::load_aligned(tile.stress_in + i * kTile + l);
@@ -74,7 +75,7 @@ UNIPHY_INLINE Svd3<V> projected_svd(const SeedTile<T>& tile, std::ptrdiff_t l) {
   return s;
 }
 template <class V, class T>
-UNIPHY_INLINE Mat3<V> projected_rotation(const SeedTile<T>& tile, std::ptrdiff_t l) {
+UNIPHY_INLINE Mat3<V> projected_rotation(const PublishedTile<T>& tile, std::ptrdiff_t l) {
   return mult(get3<V>(tile.rotations, 0, l), get3<V>(tile.rotations, 9, l));
 }
 
@@ -96,15 +97,15 @@ UNIPHY_INLINE StressInputs<V> stress_inputs(const Mat3<V>& F, const Svd3<V>& svd
   return s;
 }
 
-}  // namespace seed_detail
+}  // namespace published_detail
 
 /// Runs both networks on one tile; returns Δ and S₁ as planes.
 template <bool keep, class T>
-inline void seed_tile_forward(const LearnedLaw<T>& law, std::ptrdiff_t count, View<const T> F_trial,
-                              View<const T> C, const SeedTile<T>& tile, const T*& delta,
-                              const T*& S1) {
+inline void published_tile_forward(const LearnedLaw<T>& law, std::ptrdiff_t count,
+                                   View<const T> F_trial, View<const T> C,
+                                   const PublishedTile<T>& tile, const T*& delta, const T*& S1) {
   using V = Lanes<T>;
-  using namespace seed_detail;
+  using namespace published_detail;
   constexpr int w = width_of<V>;
   for (std::ptrdiff_t pair = 0; pair < kTile; pair += 2 * w) {
     const Mat3<V> F[2] = {load_mat3<V, T>(F_trial, pair, count - pair, true),
@@ -154,10 +155,10 @@ inline void published_evaluate(const LearnedLaw<T>& law, std::ptrdiff_t count,
                                View<const T> F_trial, View<const T> C, View<T> F_proj, View<T> tau,
                                T* scratch) {
   using V = Lanes<T>;
-  using namespace seed_detail;
-  const SeedTile<T> tile(law, scratch);
+  using namespace published_detail;
+  const PublishedTile<T> tile(law, scratch);
   const T *delta, *S1;
-  seed_tile_forward<false>(law, count, F_trial, C, tile, delta, S1);
+  published_tile_forward<false>(law, count, F_trial, C, tile, delta, S1);
   for (std::ptrdiff_t l = 0; l < count; l += width_of<V>) {
     const Mat3<V> F = get3<V>(tile.projection_in, 0, l) + get3<V>(delta, 0, l);
     if (F_proj) store_mat3<V, T>(F_proj, l, count - l, F);
@@ -176,11 +177,11 @@ inline void published_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, Vi
                               View<T> grad_F_trial, View<T> grad_C, T* accumulator, T* weight_sums,
                               T* scratch) {
   using V = Lanes<T>;
-  using namespace seed_detail;
+  using namespace published_detail;
   constexpr int w = width_of<V>;
-  const SeedTile<T> tile(law, scratch);
+  const PublishedTile<T> tile(law, scratch);
   const T *delta, *S1;
-  seed_tile_forward<true>(law, count, F_trial, C, tile, delta, S1);
+  published_tile_forward<true>(law, count, F_trial, C, tile, delta, S1);
   const V scale(law.stress_scale), zero(T(0)), one(T(1)), floor(T(1e-6)), t0 = V(T(kTimeScale));
   V sum_log_s = zero;
   for (std::ptrdiff_t l = 0; l < kTile; l += w) {

@@ -115,7 +115,7 @@ TEST_P(LearnedLawOp, FollowsItsReference) {
     LawOutput expected;
     expected.F_proj = reference::learned_project(reference_law, F, z);
     expected.tau = reference::learned_stress(reference_law, expected.F_proj, C, z);
-    // the published form sees U and V, which rounding turns by eps/gap.
+    // The published form sees U and V, which rounding turns by eps/gap.
     const bool turns = form() == LawForm::published;
     EXPECT_LE(relative(out.F_proj, expected.F_proj), turns ? 1e-10 : 1e-12);
     EXPECT_LE(relative(out.tau, expected.tau), turns ? 3e-9 : 1e-11);
