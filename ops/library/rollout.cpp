@@ -73,8 +73,8 @@ std::tuple<Tensor, Tensor> rollout_op(
     const Text& activation, const c10::optional<std::vector<std::int64_t>>& projection_widths,
     const c10::optional<Tensor>& projection,
     const c10::optional<std::vector<std::int64_t>>& stress_widths,
-    const c10::optional<Tensor>& stress, std::int64_t n, double dt, at::ArrayRef<double> gravity,
-    const std::string& walls, std::int64_t bound) {
+    const c10::optional<Tensor>& stress, const c10::optional<Tensor>& memory0, std::int64_t n,
+    double dt, at::ArrayRef<double> gravity, const std::string& walls, std::int64_t bound) {
   RolloutSettings settings;
   settings.grid = grid_settings("rollout", n, dt, gravity, walls, bound);
   settings.steps = steps;
@@ -84,8 +84,8 @@ std::tuple<Tensor, Tensor> rollout_op(
   const auto bodies =
       make_bodies(x0.size(0), laws, parameters, sizes,
                   {form, activation, projection_widths, stress_widths, projection, stress});
-  const RolloutFrames frames =
-      rollout(x0, v0, C0.value_or(Tensor()), F0.value_or(Tensor()), mass, volume, bodies, settings);
+  const RolloutFrames frames = rollout(x0, v0, C0.value_or(Tensor()), F0.value_or(Tensor()), mass,
+                                       volume, bodies, settings, memory0.value_or(Tensor()));
   return {frames.x, velocities ? frames.v : x0.new_empty({0, x0.size(0), 3})};
 }
 
@@ -93,15 +93,17 @@ std::tuple<Tensor, Tensor> rollout_op(
 
 void define_rollout(torch::Library& library) {
   // `steps` MPM steps from x0 [P, 3] m, v0 [P, 3] m/s, C0 [P, 3, 3] 1/s (None: zero), F0 [P, 3, 3]
-  // (None: I); mass [P] kg and volume [P] m³ are constants. laws and parameters: one for each body,
-  // an analytic law or "learned" with its code z; sizes: the particles of each body, in order.
-  // Learned bodies share the networks. → frames 0, every, 2 every, … ≤ steps: positions [K, P, 3]
-  // m and, with velocities, [K, P, 3] m/s, else [0, P, 3]: ops/rollout/rollout.hpp.
+  // (None: I), memory0 [P] of laws that have one (None: zero); mass [P] kg and volume [P] m³ are
+  // constants. laws and parameters: one for each body, an analytic law or "learned" with its code
+  // z; sizes: the particles of each body, in order. Learned bodies share the networks. → frames 0,
+  // every, 2 every, … ≤ steps: positions [K, P, 3] m and, with velocities, [K, P, 3] m/s, else [0,
+  // P, 3]: ops/rollout/rollout.hpp.
   library.def(
       ("rollout(Tensor x0, Tensor v0, Tensor mass, Tensor volume, str[] laws, Tensor[] parameters, "
        "int steps, int every=1, *, bool velocities=False, Tensor? C0=None, Tensor? F0=None, "
        "int[] sizes=[], str? form=None, str? activation=None, int[]? projection_widths=None, "
-       "Tensor? projection=None, int[]? stress_widths=None, Tensor? stress=None, " +
+       "Tensor? projection=None, int[]? stress_widths=None, Tensor? stress=None, Tensor? "
+       "memory0=None, " +
        std::string(kGridArguments) + ") -> (Tensor x, Tensor v)")
           .c_str(),
       &rollout_op);

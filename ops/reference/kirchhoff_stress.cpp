@@ -38,6 +38,7 @@ Tensor kirchhoff_stress(LawId law, const Tensor& F, const Tensor& C, const Mater
     }
     case LawId::plasticine:
     case LawId::sand:
+    case LawId::volume_corrected_sand:
     case LawId::non_newtonian: {
       const Svd3 svd = svd3(F);
       const Tensor strain = svd.sigma.clamp_min(kernels::kMinimumStretch).log();

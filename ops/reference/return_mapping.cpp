@@ -3,7 +3,11 @@
 #include <torch/torch.h>
 
 #include <cmath>
+#include <string>
+#include <tuple>
+#include <utility>
 
+#include "ops/kernels/base/error.hpp"
 #include "ops/kernels/spectral/limits.hpp"
 #include "ops/reference/svd3.hpp"
 
@@ -19,45 +23,78 @@ Tensor volumetric(const Tensor& F) {
   return J.pow(1.0 / 3).view({-1, 1, 1}) * torch::eye(3, F.options());
 }
 
+/// The strain by its trace and its deviator, as the mappings take it.
+struct Strain {
+  explicit Strain(const Tensor& sigma, const Tensor& memory = {})
+      : stretch(sigma.clamp_min(kernels::kMinimumStretch)) {
+    const Tensor logarithm = stretch.log();
+    const Tensor own = logarithm.sum(-1, true);
+    deviator = logarithm - own / 3;
+    trace = memory.defined() ? own + memory.unsqueeze(-1) : own;
+    // A norm of zero has no derivative; such particles do not yield, or go to the tip.
+    const Tensor squared = deviator.square().sum(-1, true);
+    norm = torch::where(squared > 0, squared, torch::ones_like(squared)).sqrt() *
+           (squared > 0).to(sigma.scalar_type());
+    direction = deviator / torch::where(squared > 0, norm, torch::ones_like(norm));
+  }
+  Tensor whole() const { return deviator + trace / 3; }
+  Tensor stretch, trace, deviator, norm, direction;
+};
+
+/// log Σ' of Drucker–Prager, and where the strain is outside of the cone.
+std::pair<Tensor, Tensor> drucker_prager(const Strain& e, const Tensor& mu, const Tensor& lambda,
+                                         const Tensor& sine) {
+  const Tensor alpha = std::sqrt(2.0 / 3) * 2 * sine / (3 - sine);
+  const Tensor excess = e.norm + alpha * (3 * lambda + 2 * mu) / (2 * mu) * e.trace;
+  const Tensor strain = e.whole();
+  const Tensor inside = torch::where(excess > 0, strain - excess * e.direction, strain);
+  return {torch::where(e.trace > 0, torch::zeros_like(strain), inside),
+          (e.trace > 0).logical_or(excess > 0)};
+}
+
 }  // namespace
 
 Tensor return_mapping(LawId law, const Tensor& F, const Material& m, double dt) {
+  if (kernels::law_has_memory(law))
+    throw Error(std::string("law ") + kernels::law_name(law) + " has memory");
   if (law == LawId::elastic || law == LawId::fixed_corotated) return F;
   if (law == LawId::newtonian || law == LawId::water) return volumetric(F);
   const auto number = [&F](const Parameter& p) { return p.tensor().to(F.scalar_type()); };
   const Tensor mu = number(m.mu), lambda = number(m.lambda), tau_y = number(m.tau_y);
   const Svd3 svd = svd3(F);
-  const Tensor stretch = svd.sigma.clamp_min(kernels::kMinimumStretch);
-  const Tensor strain = stretch.log();
-  const Tensor trace = strain.sum(-1, true);
-  const Tensor deviator = strain - trace / 3;
-  // A norm of zero has no derivative; such particles do not yield, or go to the tip.
-  const Tensor squared = deviator.square().sum(-1, true);
-  const Tensor norm = torch::where(squared > 0, squared, torch::ones_like(squared)).sqrt() *
-                      (squared > 0).to(F.scalar_type());
-  const Tensor direction = deviator / torch::where(squared > 0, norm, torch::ones_like(norm));
+  const Strain e(svd.sigma);
 
   Tensor projected, yields;  // log Σ', and where it applies
   if (law == LawId::sand) {
-    const Tensor sine = number(m.theta).sin();
-    const Tensor alpha = std::sqrt(2.0 / 3) * 2 * sine / (3 - sine);
-    const Tensor excess = norm + alpha * (3 * lambda + 2 * mu) / (2 * mu) * trace;
-    projected = torch::where(trace > 0, torch::zeros_like(strain), strain - excess * direction);
-    yields = (trace > 0).logical_or(excess > 0);
+    std::tie(projected, yields) = drucker_prager(e, mu, lambda, number(m.theta).sin());
   } else {
-    const Tensor excess = norm - tau_y / (2 * mu);
+    const Tensor excess = e.norm - tau_y / (2 * mu);
     yields = excess > 0;
     if (law == LawId::plasticine) {
-      projected = strain - excess * direction;
+      projected = e.whole() - excess * e.direction;
     } else {
-      const Tensor mu_hat = mu / 3 * stretch.square().sum(-1, true);
-      const Tensor s = 2 * mu * norm;
+      const Tensor mu_hat = mu / 3 * e.stretch.square().sum(-1, true);
+      const Tensor s = 2 * mu * e.norm;
       const Tensor s_hat = s - 2 * mu * excess / (1 + number(m.eta) / (2 * mu_hat * dt));
-      projected = s_hat / (2 * mu) * direction + trace / 3;
+      projected = s_hat / (2 * mu) * e.direction + e.trace / 3;
     }
   }
   const Tensor mapped = torch::matmul(svd.U * projected.exp().unsqueeze(-2), svd.Vh);
   return torch::where(yields.unsqueeze(-1), mapped, F);
+}
+
+MemoryMapping return_mapping_with_memory(LawId law, const Tensor& F, const Tensor& memory,
+                                         const Material& m) {
+  if (!kernels::law_has_memory(law))
+    throw Error(std::string("law ") + kernels::law_name(law) + " has no memory");
+  const auto number = [&F](const Parameter& p) { return p.tensor().to(F.scalar_type()); };
+  const Svd3 svd = svd3(F);
+  const Tensor projected = drucker_prager(Strain(svd.sigma, memory), number(m.mu), number(m.lambda),
+                                          number(m.theta).sin())
+                               .first;
+  const Tensor trial = svd.sigma.clamp_min(kernels::kMinimumStretch).log().sum(-1);
+  return {torch::matmul(svd.U * projected.exp().unsqueeze(-2), svd.Vh),
+          memory + trial - projected.sum(-1)};
 }
 
 }  // namespace uniphy::ops::reference

@@ -2,7 +2,7 @@
 
 #include <torch/types.h>
 
-#include "ops/laws/material.hpp"
+#include "ops/laws/return_mapping.hpp"
 
 namespace uniphy::ops::reference {
 
@@ -11,5 +11,9 @@ namespace uniphy::ops::reference {
 /// singular values are apart.
 torch::Tensor return_mapping(kernels::LawId law, const torch::Tensor& F, const Material& material,
                              double dt);
+
+/// The same as ops::return_mapping_with_memory, of the one law that has one.
+MemoryMapping return_mapping_with_memory(kernels::LawId law, const torch::Tensor& F,
+                                         const torch::Tensor& memory, const Material& material);
 
 }  // namespace uniphy::ops::reference

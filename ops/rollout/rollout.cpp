@@ -105,9 +105,10 @@ kernels::Rollout<T> make_rollout(const Plan& plan, const Tensor& parameters, con
 class RolloutFunction : public torch::autograd::Function<RolloutFunction> {
  public:
   static variable_list forward(AutogradContext* ctx, const Tensor& x, const Tensor& v,
-                               const Tensor& C, const Tensor& F, const Tensor& parameters,
-                               const Tensor& /*weights: for the graph*/, const Tensor& mass,
-                               const Tensor& volume, const c10::intrusive_ptr<Plan>& plan) {
+                               const Tensor& C, const Tensor& F, const Tensor& memory,
+                               const Tensor& parameters, const Tensor& /*weights: for the graph*/,
+                               const Tensor& mass, const Tensor& volume,
+                               const c10::intrusive_ptr<Plan>& plan) {
     const RolloutSettings& settings = plan->settings;
     const std::int64_t frames =
         kernels::Rollout<double>::frame_count(settings.steps, settings.every);
@@ -118,11 +119,11 @@ class RolloutFunction : public torch::autograd::Function<RolloutFunction> {
       using T = decltype(real);
       auto recording = c10::make_intrusive<Recording<T>>(
           make_rollout<T>(*plan, parameters.detach(), mass, volume));
-      recording->rollout.record(
-          {to_vector<T>(x), to_vector<T>(v), to_vector<T>(C), to_vector<T>(F)}, settings.steps,
-          settings.every, frames_x.template data_ptr<T>(),
-          settings.velocities ? frames_v.template data_ptr<T>() : nullptr,
-          plan->record ? &recording->tape : nullptr);
+      recording->rollout.record({to_vector<T>(x), to_vector<T>(v), to_vector<T>(C), to_vector<T>(F),
+                                 to_vector<T>(memory)},
+                                settings.steps, settings.every, frames_x.template data_ptr<T>(),
+                                settings.velocities ? frames_v.template data_ptr<T>() : nullptr,
+                                plan->record ? &recording->tape : nullptr);
       recording->weights = plan->weights;
       ctx->saved_data["recording"] = torch::IValue::make_capsule(recording);
     });
@@ -132,7 +133,7 @@ class RolloutFunction : public torch::autograd::Function<RolloutFunction> {
   }
 
   static variable_list backward(AutogradContext* ctx, variable_list grad_out) {
-    variable_list grad(9);
+    variable_list grad(10);
     const bool is_double = ctx->saved_data["double"].toBool();
     if (grad_out[1].defined() && grad_out[1].numel() == 0) grad_out[1] = Tensor();
     if (!grad_out[0].defined() && !grad_out[1].defined()) return grad;
@@ -142,7 +143,7 @@ class RolloutFunction : public torch::autograd::Function<RolloutFunction> {
           ctx->saved_data["recording"].toCapsule());
       std::vector<bool> of_weights;
       for (const BodyWeights& w : recording->weights)
-        of_weights.push_back(ctx->needs_input_grad(5) && (w.projection || w.stress));
+        of_weights.push_back(ctx->needs_input_grad(6) && (w.projection || w.stress));
       const kernels::RolloutGradient<T> g =
           recording->rollout.adjoint(recording->tape, gradient_data<T>(grad_out[0]),
                                      gradient_data<T>(grad_out[1]), of_weights);
@@ -157,12 +158,14 @@ class RolloutFunction : public torch::autograd::Function<RolloutFunction> {
       put(1, g.state.v, {P, 3});
       put(2, g.state.C, {P, 3, 3});
       put(3, g.state.F, {P, 3, 3});
-      if (ctx->needs_input_grad(4)) {
+      // Empty where no law has memory, and then it is not differentiated.
+      if (!g.state.memory.empty()) put(4, g.state.memory, {P});
+      if (ctx->needs_input_grad(5)) {
         std::vector<double> all;
         for (const auto& body : g.parameters) all.insert(all.end(), body.begin(), body.end());
-        grad[4] = torch::tensor(all, torch::kFloat64);
+        grad[5] = torch::tensor(all, torch::kFloat64);
       }
-      if (ctx->needs_input_grad(5)) grad[5] = weight_gradient(g.weights, recording->weights);
+      if (ctx->needs_input_grad(6)) grad[6] = weight_gradient(g.weights, recording->weights);
     });
     return once_differentiable("rollout", std::move(grad));
   }
@@ -172,7 +175,8 @@ class RolloutFunction : public torch::autograd::Function<RolloutFunction> {
 
 RolloutFrames rollout(const Tensor& x0, const Tensor& v0, const Tensor& C0, const Tensor& F0,
                       const Tensor& mass, const Tensor& volume,
-                      const std::vector<RolloutBody>& bodies, const RolloutSettings& settings) {
+                      const std::vector<RolloutBody>& bodies, const RolloutSettings& settings,
+                      const Tensor& memory0) {
   const auto type = real_type("rollout", "x0", x0);
   const Tensor x = checked("rollout", "x0", x0, type, {kAnySize, 3});
   const std::int64_t P = x.size(0);
@@ -214,10 +218,12 @@ RolloutFrames rollout(const Tensor& x0, const Tensor& v0, const Tensor& C0, cons
   const Tensor v = checked("rollout", "v0", v0, type, {P, 3});
   const Tensor m = checked("rollout", "mass", mass, type, {P}).detach();
   const Tensor V = checked("rollout", "volume", volume, type, {P}).detach();
-  for (const Tensor& t : {x, v, C, F, packed, weights})
+  const Tensor memory = memory0.defined() ? checked("rollout", "memory0", memory0, type, {P})
+                                          : torch::empty({0}, x.options().requires_grad(false));
+  for (const Tensor& t : {x, v, C, F, memory, packed, weights})
     plan->record = plan->record || t.requires_grad();
   plan->record = plan->record && torch::GradMode::is_enabled();
-  const variable_list out = RolloutFunction::apply(x, v, C, F, packed, weights, m, V, plan);
+  const variable_list out = RolloutFunction::apply(x, v, C, F, memory, packed, weights, m, V, plan);
   return {out[0], settings.velocities ? out[1] : Tensor()};
 }
 

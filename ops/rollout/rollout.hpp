@@ -36,15 +36,17 @@ struct RolloutFrames {
 
 /// `steps` MPM steps (kernels::Rollout) as one differentiable op.
 ///   x0 [P, 3] m, v0 [P, 3] m/s, C0 [P, 3, 3] 1/s (undefined: zero), F0 [P, 3, 3] (undefined: I),
-///   mass [P] kg, volume [P] m³ at rest: all float32 or all float64, CPU
-/// Differentiable, once, by x0, v0, C0, F0, the parameters of every body and the numbers of its
-/// networks (where none of those wants a gradient, its price is not paid); mass and volume are
-/// constants. The backward pass replays segments from checkpoints: memory grows with sqrt(steps).
-/// The same bits on any number of threads. Throws Error naming the argument, what was expected and
-/// what was found; or the particle that leaves the grid, with the step and the likely cause.
+///   mass [P] kg, volume [P] m³ at rest, memory0 [P] of the laws that have one (undefined: zero;
+///   not looked at where no law has one): all float32 or all float64, CPU
+/// Differentiable, once, by x0, v0, C0, F0, memory0, the parameters of every body and the numbers
+/// of its networks (where none of those wants a gradient, its price is not paid); mass and volume
+/// are constants. The backward pass replays segments from checkpoints: memory grows with
+/// sqrt(steps). The same bits on any number of threads. Throws Error naming the argument, what was
+/// expected and what was found; or the particle that leaves the grid, with the step and the likely
+/// cause.
 RolloutFrames rollout(const torch::Tensor& x0, const torch::Tensor& v0, const torch::Tensor& C0,
                       const torch::Tensor& F0, const torch::Tensor& mass,
                       const torch::Tensor& volume, const std::vector<RolloutBody>& bodies,
-                      const RolloutSettings& settings);
+                      const RolloutSettings& settings, const torch::Tensor& memory0 = {});
 
 }  // namespace uniphy::ops

@@ -23,7 +23,17 @@ class Errors(unittest.TestCase):
              "svd3: F: expected [P, 3, 3] Float or Double on cpu, found [3, 3] Double on cpu"),
             (lambda: ops.return_mapping("clay", F, elastic, 1e-3),
              'return_mapping: law: expected one of elastic, newtonian, plasticine, sand, '
-             'non_newtonian, fixed_corotated, water, learned; found "clay"'),
+             'non_newtonian, fixed_corotated, water, volume_corrected_sand, learned; found "clay"'),
+            (lambda: ops.return_mapping("volume_corrected_sand", F, z[:3] + 0.1, 1e-3),
+             "return_mapping: law: expected one without memory, found volume_corrected_sand "
+             "(return_mapping_with_memory takes it)"),
+            (lambda: ops.return_mapping_with_memory("sand", F, one, z[:3] + 0.1, 1e-3),
+             "return_mapping_with_memory: law: expected one with memory, found sand"),
+            (lambda: ops.return_mapping_with_memory("volume_corrected_sand", F, one[:3],
+                                                    z[:3] + 0.1, 1e-3),
+             "return_mapping_with_memory: memory: expected [4] Double on cpu, found [3] Double"),
+            (lambda: rollout(memory0=one[:2]),
+             "rollout: memory0: expected [4] Double on cpu, found [2] Double on cpu"),
             (lambda: ops.return_mapping("learned", F, elastic, 1e-3),
              'return_mapping: law: expected an analytic one, found "learned"'),
             (lambda: ops.kirchhoff_stress("sand", F, None, elastic),

@@ -53,6 +53,19 @@ class Gradients(unittest.TestCase):
                 self.check(lambda F, p: ops.return_mapping(law, F, p.exp(), 1e-2), F, logarithms,
                            every_input_counts=law in ("plasticine", "sand", "non_newtonian"))
 
+    def test_return_mapping_with_memory(self):
+        logarithms = torch.tensor(ANALYTIC_LAWS["sand"], dtype=torch.float64).log()
+        F = deformations(8, 0.05)
+        memory = torch.linspace(0.02, 0.3, 8, dtype=torch.float64)
+        law = "volume_corrected_sand"
+        projected, after = ops.return_mapping_with_memory(law, F, memory, logarithms.exp(), 1e-3)
+        # The volume is in F or in the memory.
+        volume = torch.linalg.det(F).log() + memory - torch.linalg.det(projected).log()
+        self.assertTrue(torch.allclose(after, volume, atol=1e-13))
+        self.assertTrue((after == 0).any() and (after > 0).any())
+        self.check(lambda F, m, p: ops.return_mapping_with_memory(law, F, m, p.exp(), 1e-3), F,
+                   memory, logarithms)
+
     def test_kirchhoff_stress(self):
         torch.manual_seed(2)
         C = normal(4, 3, 3, scale=10)

@@ -28,63 +28,76 @@ inline kernels::LawParameters<double> to_parameters(const ParameterArray& p) {
   return {p[0], p[1], p[2], p[3], p[4]};
 }
 
-/// The scalar L = W₁ : F_proj + W₂ : τ/s of one particle, its gradient by the adjoint kernels and
-/// by central differences.
+/// The scalar L = W₁ : F_proj + W₂ : τ/s + W₃ · memory after of one particle, its gradient by the
+/// adjoint kernels and by central differences.
 struct LawGradientCheck {
   kernels::LawTable<double>::Law law;
   std::vector<int> places;  ///< the parameters that the law has
   Stage stage = Stage::fused;
   double dt = 1e-4;
   Matrix W1, W2;  ///< W2 already divided by the stress scale
+  double W3 = 0;
+  double memory = 0;  ///< before the step
 
   static kernels::View<const double> view(const double* data) { return {data, 9, 1}; }
   static kernels::View<double> view(double* data) { return {data, 9, 1}; }
 
   double loss(const Matrix& F, const Matrix& C, const ParameterArray& p) const {
+    return loss(F, C, p, memory);
+  }
+  double loss(const Matrix& F, const Matrix& C, const ParameterArray& p, double before) const {
     Matrix projected{}, tau{};
+    double after = 0;
+    const kernels::LawMemory<double> of_law{{&before, 1, 1}, {&after, 1, 1}};
     const auto parameters = to_parameters(p);
     if (stage == Stage::project) {
-      law.project(1, parameters, dt, view(F.data()), view(projected.data()));
-      return inner(W1, projected);
+      law.project(1, parameters, dt, view(F.data()), view(projected.data()), of_law);
+      return inner(W1, projected) + W3 * after;
     }
     if (stage == Stage::stress) {
       law.stress(1, parameters, view(F.data()), view(C.data()), view(tau.data()));
       return inner(W2, tau);
     }
     law.evaluate(1, parameters, dt, view(F.data()), view(C.data()), view(projected.data()),
-                 view(tau.data()));
-    return inner(W1, projected) + inner(W2, tau);
+                 view(tau.data()), of_law);
+    return inner(W1, projected) + inner(W2, tau) + W3 * after;
   }
 
   void adjoint(const Matrix& F, const Matrix& C, const ParameterArray& p, Matrix& grad_F,
-               Matrix& grad_C, ParameterArray& grad_p) const {
+               Matrix& grad_C, ParameterArray& grad_p, double* grad_memory = nullptr) const {
     kernels::LawParameters<double> sum;
+    double none = 0;
+    const kernels::LawMemoryAdjoint<double> of_law{
+        {&memory, 1, 1}, {&W3, 1, 1}, {grad_memory ? grad_memory : &none, 1, 1}};
     const auto parameters = to_parameters(p);
     grad_F = {};
     grad_C = {};
     if (stage == Stage::project) {
       law.project_adjoint(1, parameters, dt, view(F.data()), view(W1.data()), view(grad_F.data()),
-                          &sum);
+                          &sum, of_law);
     } else if (stage == Stage::stress) {
       law.stress_adjoint(1, parameters, view(F.data()), view(C.data()), view(W2.data()),
                          view(grad_F.data()), view(grad_C.data()), &sum);
     } else {
       law.adjoint(1, parameters, dt, view(F.data()), view(C.data()), view(W1.data()),
-                  view(W2.data()), view(grad_F.data()), view(grad_C.data()), &sum);
+                  view(W2.data()), view(grad_F.data()), view(grad_C.data()), &sum, of_law);
     }
     grad_p = {sum.mu, sum.lambda, sum.tau_y, sum.theta, sum.eta};
   }
 
   struct Errors {
-    double F = 0, C = 0, parameters = 0;
+    double F = 0, C = 0, parameters = 0, memory = 0;
     double size_F = 0, size_C = 0, size_parameters = 0;  ///< norms of the differences' gradients
-    double worst() const { return std::max({F, C, parameters}); }
+    double worst() const { return std::max({F, C, parameters, memory}); }
   };
 
   Errors errors(const Matrix& F, const Matrix& C, const ParameterArray& p, double step) const {
     Matrix grad_F, grad_C;
     ParameterArray grad_p;
-    adjoint(F, C, p, grad_F, grad_C, grad_p);
+    double grad_memory = 0;
+    adjoint(F, C, p, grad_F, grad_C, grad_p, &grad_memory);
+    const double of_memory = central_differences(
+        [&](const std::vector<double>& x) { return loss(F, C, p, x[0]); }, {memory}, {3e-6})[0];
     const auto vector = [](const Matrix& m) { return std::vector<double>(m.begin(), m.end()); };
     const auto matrix = [](const std::vector<double>& v) {
       Matrix m;
@@ -117,6 +130,8 @@ struct LawGradientCheck {
     e.size_C = size(of_C);
     e.size_parameters = size(of_p);
     e.F = relative_error(vector(grad_F), of_F);
+    // One number, which may cancel to next to nothing.
+    e.memory = std::abs(grad_memory - of_memory) / std::max(std::abs(of_memory), 1e-2);
     // Near det F = 0 the pressure of a fluid, J⁻⁶, drowns differences with respect to C.
     if (det(F) > 0.1) e.C = relative_error(vector(grad_C), of_C);
     e.parameters = relative_error(grad_p, of_p);
@@ -134,6 +149,7 @@ inline LawGradientCheck make_check(kernels::LawId id, Stage stage, kernels::Isa 
   check.stage = stage;
   check.W1 = random_matrix(random);
   check.W2 = random_matrix(random, 1e-5);
+  if (kernels::law_has_memory(id)) check.W3 = random_matrix(random)[0];
   return check;
 }
 

@@ -19,6 +19,7 @@ namespace uniphy::testing {
 /// A small cube that falls on the floor while it turns.
 struct RolloutScene {
   torch::Tensor x, v, C, F, mass, volume;
+  torch::Tensor memory;  ///< undefined: zero
   ops::RolloutSettings settings;
 
   explicit RolloutScene(torch::ScalarType type = torch::kFloat64, int side = 5) {
@@ -45,7 +46,7 @@ struct RolloutScene {
   }
   ops::RolloutFrames run(const kernels::LawDescription& law,
                          const torch::Tensor& parameters) const {
-    return ops::rollout(x, v, C, F, mass, volume, {body(law, parameters)}, settings);
+    return ops::rollout(x, v, C, F, mass, volume, {body(law, parameters)}, settings, memory);
   }
 };
 
@@ -123,6 +124,10 @@ inline RolloutScene scene_of(const RolloutMaterial& m, torch::ScalarType type = 
     scene.F = torch::diag(torch::tensor({1.2, 1.0, 0.8}, torch::kFloat64))
                   .repeat({scene.x.size(0), 1, 1})
                   .to(type);
+  }
+  if (kernels::law_has_memory(m.law.id)) {
+    torch::manual_seed(13);
+    scene.memory = (1e-4 * torch::rand({scene.x.size(0)}, torch::kFloat64)).to(type);
   }
   return scene;
 }

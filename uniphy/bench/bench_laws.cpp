@@ -13,15 +13,22 @@ using torch::Tensor;
 
 constexpr double kStep = 5e-4;  // s
 
+/// F → F_proj by the ops or by their references; a law with memory begins without.
+Tensor projected(kernels::LawId id, const ops::Material& material, const Tensor& F, bool plain) {
+  if (!kernels::law_has_memory(id)) {
+    return (plain ? ops::reference::return_mapping : ops::return_mapping)(id, F, material, kStep);
+  }
+  const Tensor memory = torch::zeros({F.size(0)}, F.options().requires_grad(false));
+  return plain ? ops::reference::return_mapping_with_memory(id, F, memory, material).F_proj
+               : ops::return_mapping_with_memory(id, F, memory, material, kStep).F_proj;
+}
+
 /// F → F_proj, τ by the ops or by their references.
 std::vector<Tensor> law(kernels::LawId id, const ops::Material& material, const Tensor& F,
                         const Tensor& C, bool plain) {
-  if (plain) {
-    const Tensor F_proj = ops::reference::return_mapping(id, F, material, kStep);
-    return {F_proj, ops::reference::kirchhoff_stress(id, F_proj, C, material)};
-  }
-  const Tensor F_proj = ops::return_mapping(id, F, material, kStep);
-  return {F_proj, ops::kirchhoff_stress(id, F_proj, C, material)};
+  const Tensor F_proj = projected(id, material, F, plain);
+  return {F_proj, (plain ? ops::reference::kirchhoff_stress : ops::kirchhoff_stress)(id, F_proj, C,
+                                                                                     material)};
 }
 
 }  // namespace

@@ -18,7 +18,8 @@ class FreeLaw : public kernels::LawKernel<T> {
   void parameter_gradient(const T*, T*) const override {}
 
   void evaluate(std::ptrdiff_t count, T, kernels::View<const T> F_trial, kernels::View<const T>,
-                kernels::View<T> F_proj, kernels::View<T> tau) const override {
+                kernels::View<T> F_proj, kernels::View<T> tau,
+                const kernels::LawMemory<T>&) const override {
     for (int k = 0; k < 9; ++k) {
       const T one = k % 4 == 0 ? T(1) : T(0);
       for (std::ptrdiff_t p = 0; p < count; ++p) {
@@ -31,7 +32,8 @@ class FreeLaw : public kernels::LawKernel<T> {
 
   void adjoint(std::ptrdiff_t count, T, kernels::View<const T>, kernels::View<const T>,
                kernels::View<const T> grad_F_proj, kernels::View<const T> grad_tau,
-               kernels::View<T> grad_F_trial, kernels::View<T>, T*, T*) const override {
+               kernels::View<T> grad_F_trial, kernels::View<T>, T*, T*,
+               const kernels::LawMemoryAdjoint<T>&) const override {
     for (int k = 0; k < 9; ++k) {
       for (std::ptrdiff_t p = 0; p < count; ++p) {
         grad_F_trial(p, k) = grad_F_proj(p, k) + kStiffness * grad_tau(p, k);

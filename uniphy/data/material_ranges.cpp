@@ -60,7 +60,8 @@ double yield_norm(const LawDescription& law, double trace) {
     case LawId::plasticine:
     case LawId::non_newtonian:
       return law.tau_y / (2 * law.mu);
-    case LawId::sand: {
+    case LawId::sand:
+    case LawId::volume_corrected_sand: {
       if (trace > 0) return 0;
       const double sine = std::sin(law.theta);
       const double alpha = std::sqrt(2.0 / 3) * 2 * sine / (3 - sine);

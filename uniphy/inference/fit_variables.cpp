@@ -146,7 +146,8 @@ std::unique_ptr<const FitVariables> make_analytic_variables(
 std::vector<std::array<double, 2>> default_ranges(kernels::LawId id) {
   // The laws beside the five are elastic at small strain.
   const bool other = id == kernels::LawId::fixed_corotated || id == kernels::LawId::water;
-  const kernels::LawId like = other ? kernels::LawId::elastic : id;
+  const bool sand = id == kernels::LawId::volume_corrected_sand;
+  const kernels::LawId like = other ? kernels::LawId::elastic : sand ? kernels::LawId::sand : id;
   std::vector<std::array<double, 2>> ranges;
   for (const MaterialRanges& material : default_material_ranges()) {
     if (material.id != like) continue;

@@ -88,9 +88,10 @@ FitVariablesSource read_fit_variables(Section& config) {
        }});
   for (int i = 0; i < static_cast<int>(kernels::LawId::learned); ++i) {
     const auto id = static_cast<kernels::LawId>(i);
+    if (id == kernels::LawId::volume_corrected_sand) continue;  // an option of sand
     variants.push_back(
         {kernels::law_name(id), "its parameters, as logarithms", [&source, id](Section& s) {
-           source.id = id;
+           source.id = id == kernels::LawId::sand ? read_sand(s) : id;
            const auto defaults = default_ranges(id);
            source.ranges.clear();
            for (std::size_t k = 0; k < defaults.size(); ++k) {

@@ -45,8 +45,9 @@ class RolloutObjective : public MotionObjective {
     settings.grid = grid_;
     settings.steps = steps_.last(frames);
     settings.every = steps_.stride;
-    Tensor x =
-        rollout_(x0_, v0.to(x0_.dtype()), {}, {}, mass_tensor_, volume_tensor_, {body}, settings).x;
+    Tensor x = rollout_(x0_, v0.to(x0_.dtype()), {}, {}, mass_tensor_, volume_tensor_, {body},
+                        settings, {})
+                   .x;
     if (x.size(0) != frames) x = x.index_select(0, states_.slice(0, 0, frames));
     const Tensor difference =
         x.flatten(1).to(torch::kFloat64) - seen_.slice(0, 0, frames);  // [frames, 3 particles]

@@ -20,12 +20,22 @@ namespace {
 
 using torch::Tensor;
 
-ops::LawOutput law_of(const ops::RolloutBody& body, const Tensor& F, const Tensor& C, double dt) {
+/// memory is that of the body's particles, and is advanced where its law has one.
+ops::LawOutput law_of(const ops::RolloutBody& body, const Tensor& F, const Tensor& C, double dt,
+                      Tensor* memory) {
   if (body.law.id != kernels::LawId::learned && !body.networks.defined()) {
     const ops::Material material = body.parameters.defined()
                                        ? ops::material_of("rollout", body.law.id, body.parameters)
                                        : ops::material_of(body.law);
-    const Tensor F_proj = ops::return_mapping(body.law.id, F, material, dt);
+    Tensor F_proj;
+    if (kernels::law_has_memory(body.law.id)) {
+      const ops::MemoryMapping mapped =
+          ops::return_mapping_with_memory(body.law.id, F, *memory, material, dt);
+      F_proj = mapped.F_proj;
+      *memory = mapped.memory;
+    } else {
+      F_proj = ops::return_mapping(body.law.id, F, material, dt);
+    }
     return {F_proj, ops::kirchhoff_stress(body.law.id, F_proj, C, material)};
   }
   const Tensor z =
@@ -40,7 +50,7 @@ ops::LawOutput law_of(const ops::RolloutBody& body, const Tensor& F, const Tenso
 ops::RolloutFrames stepwise_rollout(const Tensor& x0, const Tensor& v0, const Tensor& C0,
                                     const Tensor& F0, const Tensor& mass, const Tensor& volume,
                                     const std::vector<ops::RolloutBody>& given,
-                                    const ops::RolloutSettings& settings) {
+                                    const ops::RolloutSettings& settings, const Tensor& memory0) {
   std::vector<ops::RolloutBody> bodies = given;
   for (ops::RolloutBody& body : bodies) {
     if (body.law.weights && !body.networks.defined())
@@ -50,13 +60,19 @@ ops::RolloutFrames stepwise_rollout(const Tensor& x0, const Tensor& v0, const Te
   Tensor x = x0, v = v0;
   Tensor C = C0.defined() ? C0 : torch::zeros({x.size(0), 3, 3}, x.options());
   Tensor F = F0.defined() ? F0 : torch::eye(3, x.options()).repeat({x.size(0), 1, 1});
+  std::vector<Tensor> memories;
+  for (const ops::RolloutBody& body : bodies) {
+    memories.push_back(memory0.defined() ? memory0.slice(0, body.begin, body.end)
+                                         : torch::zeros({body.end - body.begin}, x.options()));
+  }
   std::vector<Tensor> frames_x{x}, frames_v{v};
   for (std::ptrdiff_t step = 0; step < settings.steps; ++step) try {  // line 4
       F = F + grid.dt * torch::bmm(C, F);                             // line 6
       std::vector<Tensor> F_proj, tau;
-      for (const ops::RolloutBody& body : bodies) {  // lines 7 to 12
+      for (std::size_t b = 0; b < bodies.size(); ++b) {  // lines 7 to 12
+        const ops::RolloutBody& body = bodies[b];
         const auto own = [&body](const Tensor& t) { return t.slice(0, body.begin, body.end); };
-        const ops::LawOutput law = law_of(body, own(F), own(C), grid.dt);
+        const ops::LawOutput law = law_of(body, own(F), own(C), grid.dt, &memories[b]);
         F_proj.push_back(law.F_proj);
         tau.push_back(law.tau);
       }

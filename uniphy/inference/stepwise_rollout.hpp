@@ -12,6 +12,7 @@ ops::RolloutFrames stepwise_rollout(const torch::Tensor& x0, const torch::Tensor
                                     const torch::Tensor& C0, const torch::Tensor& F0,
                                     const torch::Tensor& mass, const torch::Tensor& volume,
                                     const std::vector<ops::RolloutBody>& bodies,
-                                    const ops::RolloutSettings& settings);
+                                    const ops::RolloutSettings& settings,
+                                    const torch::Tensor& memory0 = {});
 
 }  // namespace uniphy

@@ -19,7 +19,7 @@ struct Field {
   const char* units;
   const char* description;
   std::vector<double> ParticleState::*state;
-  std::vector<double> Trajectory::*frames;
+  std::vector<double> Trajectory::*frames;  ///< null: in the last state alone
 };
 
 const std::vector<Field>& fields() {
@@ -33,6 +33,7 @@ const std::vector<Field>& fields() {
        &ParticleState::C,
        &Trajectory::C},
       {"F", {3, 3}, "1", "deformation gradient", &ParticleState::F, &Trajectory::F},
+      {"memory", {}, "1", "memory of the law", &ParticleState::memory, nullptr},
   };
   return all;
 }
@@ -45,6 +46,8 @@ bool stored(const Field& field, FrameFields which) {
       return which.C;
     case 'F':
       return which.F;
+    case 'm':
+      return false;
     default:
       return true;
   }
@@ -178,7 +181,7 @@ Trajectory read_trajectory(const std::filesystem::path& file, bool positions_onl
   trajectory.scene = reader.attribute_text("/", "scene");
   if (positions_only) return trajectory;
   for (const Field& field : fields()) {
-    if (field.name[0] != 'x' && reader.has(field.name)) {
+    if (field.name[0] != 'x' && field.frames != nullptr && reader.has(field.name)) {
       trajectory.*field.frames = reader.read<double>(
           field.name, with_leading({trajectory.frames, trajectory.particles}, field.row),
           hdf5::Values::finite);

@@ -13,6 +13,7 @@
 //   /mass   [particles]                kg
 //   /volume [particles]                m^3   volume at rest
 //   /final/{x,v,C,F}                         the last state, from which a run can go on
+//   /final/memory [particles]          1     memory of the laws, where a body's law has one
 //
 // Numbers are float64, indices int32 (body) and int64 (step). Every dataset has the attributes
 // `units` and `description`. The XDMF file beside it opens the trajectory in ParaView.

@@ -72,6 +72,15 @@ std::filesystem::path find_model(const std::filesystem::path& latent, const std:
 
 }  // namespace
 
+// Sand of a scene closes up again after a separation; that of the training family does not.
+LawId read_sand(Section& law) {
+  const bool corrected = law.boolean(
+      "volume_correction", true,
+      "volume gained in a separation is given back before grains press on each other again; false: "
+      "the law of the training family, which keeps it");
+  return corrected ? LawId::volume_corrected_sand : LawId::sand;
+}
+
 LawSource read_law(Section& law) {
   LawSource source;
   std::vector<Variant> variants;
@@ -82,9 +91,11 @@ LawSource read_law(Section& law) {
                         "viscoplastic, von Mises yield",
                         "fixed-corotated elastic solid",
                         "inviscid weakly compressible fluid",
+                        "",  // sand with an option
                         "a trained model with a latent code"};
   for (int i = 0; i <= static_cast<int>(LawId::learned); ++i) {
     const LawId id = static_cast<LawId>(i);
+    if (id == LawId::volume_corrected_sand) continue;
     variants.push_back({kernels::law_name(id), docs[i], [&source, id](Section& s) {
                           source.description.id = id;
                           for (const kernels::LawParameter& p : kernels::law_parameters(id)) {
@@ -92,6 +103,7 @@ LawSource read_law(Section& law) {
                                 s.real(p.name, required, range_of(p), p.unit, p.text);
                           }
                           if (id == LawId::learned) read_learned(s, &source);
+                          if (id == LawId::sand) source.description.id = read_sand(s);
                         }});
   }
   law.variant("type", required, variants, "the constitutive law");

@@ -34,6 +34,10 @@ struct LawSource {
 /// The values that a parameter of an analytic law may take.
 Range range_of(const kernels::LawParameter& parameter);
 
+/// Declares and reads volume_correction, the option of sand that scenes have by default: the id of
+/// the law with it, or without.
+kernels::LawId read_sand(Section& law);
+
 /// Declares and reads the keys of a law: `type` and, beside it, the parameters of that law.
 LawSource read_law(Section& law);
 

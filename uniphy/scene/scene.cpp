@@ -119,7 +119,7 @@ ParticleState widened(const kernels::ParticleState<T>& state) {
   const auto wide = [](const std::vector<T>& values) {
     return std::vector<double>(values.begin(), values.end());
   };
-  return {wide(state.x), wide(state.v), wide(state.C), wide(state.F)};
+  return {wide(state.x), wide(state.v), wide(state.C), wide(state.F), wide(state.memory)};
 }
 
 template <class T>

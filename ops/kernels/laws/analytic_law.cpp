@@ -26,10 +26,12 @@ template <class T>
 class AnalyticLaw final : public LawKernel<T> {
  public:
   AnalyticLaw(const LawDescription& d, Isa isa)
-      : taken_(law_parameters(d.id)),
+      : has_memory_(law_has_memory(d.id)),
+        taken_(law_parameters(d.id)),
         law_(law_table<T>(isa).laws[static_cast<int>(d.id)]),
         parameters_(kernel_parameters<T>(d)) {}
 
+  bool has_memory() const override { return has_memory_; }
   std::ptrdiff_t parameter_size() const override {
     return static_cast<std::ptrdiff_t>(taken_.size());
   }
@@ -39,20 +41,22 @@ class AnalyticLaw final : public LawKernel<T> {
   }
 
   void evaluate(std::ptrdiff_t count, T dt, View<const T> F_trial, View<const T> C, View<T> F_proj,
-                View<T> tau) const override {
-    law_.evaluate(count, parameters_, dt, F_trial, C, F_proj, tau);
+                View<T> tau, const LawMemory<T>& memory) const override {
+    law_.evaluate(count, parameters_, dt, F_trial, C, F_proj, tau, memory);
   }
   void adjoint(std::ptrdiff_t count, T dt, View<const T> F_trial, View<const T> C,
                View<const T> grad_F_proj, View<const T> grad_tau, View<T> grad_F_trial,
-               View<T> grad_C, T* accumulator, T*) const override {
+               View<T> grad_C, T* accumulator, T*,
+               const LawMemoryAdjoint<T>& memory) const override {
     LawParameters<T> sum;
     law_.adjoint(count, parameters_, dt, F_trial, C, grad_F_proj, grad_tau, grad_F_trial, grad_C,
-                 accumulator ? &sum : nullptr);
+                 accumulator ? &sum : nullptr, memory);
     if (accumulator == nullptr) return;
     for (int i = 0; i < kLawParameters; ++i) accumulator[i] += sum.*kLawParameterMembers<T>[i];
   }
 
  private:
+  bool has_memory_;
   const std::vector<LawParameter>& taken_;
   typename LawTable<T>::Law law_;
   LawParameters<T> parameters_;

@@ -13,7 +13,8 @@ namespace {
 // In the order of LawId.
 constexpr std::array<const char*, kAnalyticLaws + 1> kNames{
     "elastic",       "newtonian",       "plasticine", "sand",
-    "non_newtonian", "fixed_corotated", "water",      "learned"};
+    "non_newtonian", "fixed_corotated", "water",      "volume_corrected_sand",
+    "learned"};
 static_assert(static_cast<int>(LawId::learned) == kAnalyticLaws);
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "ops/kernels/laws/law_memory.hpp"
 #include "ops/kernels/learned/learned_law_weights.hpp"
 #include "ops/kernels/simd/view.hpp"
 
@@ -15,8 +16,9 @@ namespace uniphy::kernels {
 inline constexpr std::ptrdiff_t kLawChunk = 64;
 
 /// A constitutive law: the projection G of the trial deformation gradient and the Kirchhoff stress
-/// τ of the projected one. Simulation, inference and export see nothing else. Stateless and safe to
-/// call from several threads.
+/// τ of the projected one. Simulation, inference and export see nothing else. What it remembers of
+/// a particle, if anything, is handed in and out; itself it is stateless and safe to call from
+/// several threads.
 template <class T>
 class LawKernel {
  public:
@@ -39,29 +41,37 @@ class LawKernel {
   /// Turns both summed sums into dL/d(weights); `gradient` has weight_size() numbers.
   virtual void weight_gradient(const T* accumulator, const T* weight_sums, T* gradient) const;
 
+  /// Whether it keeps one number of memory a particle.
+  virtual bool has_memory() const { return false; }
+
   /// F_trial, C [count, 9] → F_proj, tau [count, 9]; dt in s, C in 1/s, tau in Pa. F_proj may be
   /// the same memory as F_trial.
   virtual void evaluate(std::ptrdiff_t count, T dt, View<const T> F_trial, View<const T> C,
-                        View<T> F_proj, View<T> tau) const = 0;
+                        View<T> F_proj, View<T> tau, const LawMemory<T>& memory = {}) const = 0;
 
   /// The adjoint of evaluate: given dL/dF_proj and dL/dtau, overwrites grad_F_trial, adds to
   /// grad_C, to accumulator and to weight_sums (all three may be null; weight_sums aligned to 64
   /// bytes). grad_F_trial may be the same memory as grad_F_proj.
   virtual void adjoint(std::ptrdiff_t count, T dt, View<const T> F_trial, View<const T> C,
                        View<const T> grad_F_proj, View<const T> grad_tau, View<T> grad_F_trial,
-                       View<T> grad_C, T* accumulator, T* weight_sums = nullptr) const = 0;
+                       View<T> grad_C, T* accumulator, T* weight_sums = nullptr,
+                       const LawMemoryAdjoint<T>& memory = {}) const = 0;
 };
 
 enum class LawId {
-  elastic,          ///< neo-Hookean
-  newtonian,        ///< weakly compressible viscous fluid
-  plasticine,       ///< von Mises return mapping, StVK-Hencky stress
-  sand,             ///< Drucker–Prager return mapping, StVK-Hencky stress
-  non_newtonian,    ///< viscoplastic return mapping, StVK-Hencky stress
-  fixed_corotated,  ///< τ = 2μ(F−R)Fᵀ + λJ(J−1)I
-  water,            ///< inviscid: τ = λJ(J−1)I, G(F) = J^{1/3} I
-  learned           ///< a trained model with a latent code
+  elastic,                ///< neo-Hookean
+  newtonian,              ///< weakly compressible viscous fluid
+  plasticine,             ///< von Mises return mapping, StVK-Hencky stress
+  sand,                   ///< Drucker–Prager return mapping, StVK-Hencky stress
+  non_newtonian,          ///< viscoplastic return mapping, StVK-Hencky stress
+  fixed_corotated,        ///< τ = 2μ(F−R)Fᵀ + λJ(J−1)I
+  water,                  ///< inviscid: τ = λJ(J−1)I, G(F) = J^{1/3} I
+  volume_corrected_sand,  ///< sand that closes up again after a separation; has memory
+  learned                 ///< a trained model with a latent code
 };
+
+/// Whether an analytic law keeps a number of memory a particle (LawKernel::has_memory).
+constexpr bool law_has_memory(LawId id) { return id == LawId::volume_corrected_sand; }
 
 /// Everything that names one material. Parameters that the law does not have stay 0.
 struct LawDescription {

@@ -24,29 +24,80 @@ UNIPHY_INLINE void store_optional(const View<T>& view, std::ptrdiff_t p, std::pt
 template <class Law, class T>
 struct LawBatch {
   using V = Lanes<T>;
+  using Memory = typename Law::template Memory<V>;
   static constexpr std::ptrdiff_t kWidth = width_of<V>;
 
   static void project(std::ptrdiff_t count, const LawParameters<T>& parameters, T dt,
-                      View<const T> F, View<T> F_proj) {
+                      View<const T> F, View<T> F_proj, const LawMemory<T>& memory) {
     const Material<V> m(parameters, dt);
     for (std::ptrdiff_t p = 0; p < count; p += kWidth) {
       const Mat3<V> f = load_mat3<V, T>(F, p, count - p, true);
-      store_mat3<V, T>(F_proj, p, count - p, Law::project(f, m));
+      Memory lanes;
+      lanes.load(memory, p, count - p);
+      store_mat3<V, T>(F_proj, p, count - p, Law::project(f, m, lanes));
+      lanes.store(memory, p, count - p);
     }
   }
 
   static void project_adjoint(std::ptrdiff_t count, const LawParameters<T>& parameters, T dt,
                               View<const T> F, View<const T> grad_F_proj, View<T> grad_F,
-                              LawParameters<T>* grad) {
+                              LawParameters<T>* grad, const LawMemoryAdjoint<T>& memory) {
     const Material<V> m(parameters, dt);
     MaterialGradient<V> g;
     for (std::ptrdiff_t p = 0; p < count; p += kWidth) {
       const Mat3<V> f = load_mat3<V, T>(F, p, count - p, true);
       const Mat3<V> gf = load_optional<V, T>(grad_F_proj, p, count - p);
-      store_optional<V, T>(grad_F, p, count - p, Law::project_adjoint(f, m, gf, g));
+      Memory lanes;
+      lanes.load(memory, p, count - p);
+      store_optional<V, T>(grad_F, p, count - p, Law::project_adjoint(f, m, gf, g, lanes));
+      lanes.store(memory, p, count - p);
     }
     g.add_to(grad);
   }
+
+  static void evaluate(std::ptrdiff_t count, const LawParameters<T>& parameters, T dt,
+                       View<const T> F, View<const T> C, View<T> F_proj, View<T> tau,
+                       const LawMemory<T>& memory) {
+    const Material<V> m(parameters, dt);
+    for (std::ptrdiff_t p = 0; p < count; p += kWidth) {
+      const Mat3<V> f = load_mat3<V, T>(F, p, count - p, true);
+      const Mat3<V> c = load_optional<V, T>(C, p, count - p);
+      Mat3<V> projected, stress;
+      Memory lanes;
+      lanes.load(memory, p, count - p);
+      Law::evaluate(f, c, m, projected, stress, lanes);
+      lanes.store(memory, p, count - p);
+      store_optional<V, T>(F_proj, p, count - p, projected);
+      store_optional<V, T>(tau, p, count - p, stress);
+    }
+  }
+
+  static void adjoint(std::ptrdiff_t count, const LawParameters<T>& parameters, T dt,
+                      View<const T> F, View<const T> C, View<const T> grad_F_proj,
+                      View<const T> grad_tau, View<T> grad_F, View<T> grad_C,
+                      LawParameters<T>* grad, const LawMemoryAdjoint<T>& memory) {
+    const Material<V> m(parameters, dt);
+    MaterialGradient<V> g;
+    for (std::ptrdiff_t p = 0; p < count; p += kWidth) {
+      const Mat3<V> f = load_mat3<V, T>(F, p, count - p, true);
+      const Mat3<V> c = load_optional<V, T>(C, p, count - p);
+      Memory lanes;
+      lanes.load(memory, p, count - p);
+      const Mat3<V> gf = load_optional<V, T>(grad_F_proj, p, count - p);
+      const Mat3<V> gt = load_optional<V, T>(grad_tau, p, count - p);
+      Mat3<V> gc = zero3<V>();
+      store_optional<V, T>(grad_F, p, count - p, Law::adjoint(f, c, m, gf, gt, gc, g, lanes));
+      lanes.store(memory, p, count - p);
+      store_optional<V, T>(grad_C, p, count - p, gc, true);
+    }
+    g.add_to(grad);
+  }
+};
+
+template <class Stress, class T>
+struct StressBatch {
+  using V = Lanes<T>;
+  static constexpr std::ptrdiff_t kWidth = width_of<V>;
 
   static void stress(std::ptrdiff_t count, const LawParameters<T>& parameters, View<const T> F,
                      View<const T> C, View<T> tau) {
@@ -54,7 +105,7 @@ struct LawBatch {
     for (std::ptrdiff_t p = 0; p < count; p += kWidth) {
       const Mat3<V> f = load_mat3<V, T>(F, p, count - p, true);
       const Mat3<V> c = load_optional<V, T>(C, p, count - p);
-      store_mat3<V, T>(tau, p, count - p, Law::stress(f, c, m));
+      store_mat3<V, T>(tau, p, count - p, Stress::stress(f, c, m));
     }
   }
 
@@ -68,38 +119,7 @@ struct LawBatch {
       const Mat3<V> c = load_optional<V, T>(C, p, count - p);
       const Mat3<V> gt = load_optional<V, T>(grad_tau, p, count - p);
       Mat3<V> gc = zero3<V>();
-      store_optional<V, T>(grad_F, p, count - p, Law::stress_adjoint(f, c, m, gt, gc, g));
-      store_optional<V, T>(grad_C, p, count - p, gc, true);
-    }
-    g.add_to(grad);
-  }
-
-  static void evaluate(std::ptrdiff_t count, const LawParameters<T>& parameters, T dt,
-                       View<const T> F, View<const T> C, View<T> F_proj, View<T> tau) {
-    const Material<V> m(parameters, dt);
-    for (std::ptrdiff_t p = 0; p < count; p += kWidth) {
-      const Mat3<V> f = load_mat3<V, T>(F, p, count - p, true);
-      const Mat3<V> c = load_optional<V, T>(C, p, count - p);
-      Mat3<V> projected, stress;
-      Law::evaluate(f, c, m, projected, stress);
-      store_optional<V, T>(F_proj, p, count - p, projected);
-      store_optional<V, T>(tau, p, count - p, stress);
-    }
-  }
-
-  static void adjoint(std::ptrdiff_t count, const LawParameters<T>& parameters, T dt,
-                      View<const T> F, View<const T> C, View<const T> grad_F_proj,
-                      View<const T> grad_tau, View<T> grad_F, View<T> grad_C,
-                      LawParameters<T>* grad) {
-    const Material<V> m(parameters, dt);
-    MaterialGradient<V> g;
-    for (std::ptrdiff_t p = 0; p < count; p += kWidth) {
-      const Mat3<V> f = load_mat3<V, T>(F, p, count - p, true);
-      const Mat3<V> c = load_optional<V, T>(C, p, count - p);
-      const Mat3<V> gf = load_optional<V, T>(grad_F_proj, p, count - p);
-      const Mat3<V> gt = load_optional<V, T>(grad_tau, p, count - p);
-      Mat3<V> gc = zero3<V>();
-      store_optional<V, T>(grad_F, p, count - p, Law::adjoint(f, c, m, gf, gt, gc, g));
+      store_optional<V, T>(grad_F, p, count - p, Stress::stress_adjoint(f, c, m, gt, gc, g));
       store_optional<V, T>(grad_C, p, count - p, gc, true);
     }
     g.add_to(grad);
@@ -110,7 +130,7 @@ struct LawBatch {
 template <class Law, class T>
 constexpr typename LawTable<T>::Law law_entries() {
   using Batch = LawBatch<Law, T>;
-  using Stress = LawBatch<typename Law::Stress, T>;
+  using Stress = StressBatch<typename Law::Stress, T>;
   return {Batch::project,         Batch::project_adjoint, Stress::stress,
           Stress::stress_adjoint, Batch::evaluate,        Batch::adjoint};
 }

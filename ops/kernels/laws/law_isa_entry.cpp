@@ -26,7 +26,8 @@ constexpr LawTable<T> kTable{
      law_entries<PlasticLaw<VonMises>, T>(), law_entries<PlasticLaw<DruckerPrager>, T>(),
      law_entries<PlasticLaw<Viscoplastic>, T>(),
      law_entries<DirectLaw<IdentityProjection, FixedCorotated>, T>(),
-     law_entries<DirectLaw<VolumetricProjection, Water>, T>()}};
+     law_entries<DirectLaw<VolumetricProjection, Water>, T>(),
+     law_entries<PlasticLaw<DruckerPrager, VolumeMemory>, T>()}};
 
 }  // namespace
 

@@ -42,6 +42,7 @@ const std::vector<LawParameter>& law_parameters(LawId id) {
       table_rows({&D::mu, &D::lambda, &D::tau_y, &D::eta}),
       table_rows({&D::mu, &D::lambda}),
       inviscid_fluid(),
+      table_rows({&D::mu, &D::lambda, &D::theta}),
       {}};
   return all.at(static_cast<std::size_t>(id));
 }

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 
+#include "ops/kernels/laws/law_memory.hpp"
 #include "ops/kernels/simd/dispatch.hpp"
 #include "ops/kernels/simd/view.hpp"
 
@@ -21,11 +22,12 @@ inline constexpr T LawParameters<T>::*kLawParameterMembers[kLawParameters] = {
     &LawParameters<T>::theta, &LawParameters<T>::eta};
 
 /// The number of analytic laws: LawId before `learned`.
-inline constexpr int kAnalyticLaws = 7;
+inline constexpr int kAnalyticLaws = 8;
 
 /// Entry points of the code compiled for one instruction set. Plain function pointers over views,
-/// one thread, any count; absent views (null data) read as zero and are not written. Matrices are
-/// nine numbers, row-major. In and out may be the same memory where the layout agrees.
+/// one thread, any count; absent views (null data) read as zero and are not written. Memory is that
+/// of laws that have one (law_has_memory), ignored by the others. Matrices are nine numbers,
+/// row-major. In and out may be the same memory where the layout agrees.
 template <class T>
 struct LawTable {
   using In = View<const T>;
@@ -34,20 +36,22 @@ struct LawTable {
 
   struct Law {
     /// F → F_proj
-    void (*project)(std::ptrdiff_t count, const Parameters&, T dt, In F, Out F_proj);
+    void (*project)(std::ptrdiff_t count, const Parameters&, T dt, In F, Out F_proj,
+                    const LawMemory<T>&);
     /// dL/dF_proj → dL/dF (overwritten); parameters accumulate into *grad unless it is null.
     void (*project_adjoint)(std::ptrdiff_t count, const Parameters&, T dt, In F, In grad_F_proj,
-                            Out grad_F, Parameters* grad);
+                            Out grad_F, Parameters* grad, const LawMemoryAdjoint<T>&);
     /// F, C → tau
     void (*stress)(std::ptrdiff_t count, const Parameters&, In F, In C, Out tau);
     /// dL/dtau → dL/dF (overwritten), dL/dC (added).
     void (*stress_adjoint)(std::ptrdiff_t count, const Parameters&, In F, In C, In grad_tau,
                            Out grad_F, Out grad_C, Parameters* grad);
     /// Both in one pass over the particles, with at most one SVD each.
-    void (*evaluate)(std::ptrdiff_t count, const Parameters&, T dt, In F, In C, Out F_proj,
-                     Out tau);
+    void (*evaluate)(std::ptrdiff_t count, const Parameters&, T dt, In F, In C, Out F_proj, Out tau,
+                     const LawMemory<T>&);
     void (*adjoint)(std::ptrdiff_t count, const Parameters&, T dt, In F, In C, In grad_F_proj,
-                    In grad_tau, Out grad_F, Out grad_C, Parameters* grad);
+                    In grad_tau, Out grad_F, Out grad_C, Parameters* grad,
+                    const LawMemoryAdjoint<T>&);
   };
 
   /// F → U, sigma (three numbers), Vᵀ

@@ -138,7 +138,7 @@ class LearnedLawKernel final : public LawKernel<T> {
   }
 
   void evaluate(std::ptrdiff_t count, T, View<const T> F_trial, View<const T> C, View<T> F_proj,
-                View<T> tau) const override {
+                View<T> tau, const LawMemory<T>&) const override {
     T* planes = scratch_of_thread<T>(4 * kPlanesOfTile + table_.scratch(law_));
     T* scratch = planes + 4 * kPlanesOfTile;
     for (std::ptrdiff_t p = 0; p < count; p += kTile) {
@@ -155,7 +155,8 @@ class LearnedLawKernel final : public LawKernel<T> {
 
   void adjoint(std::ptrdiff_t count, T, View<const T> F_trial, View<const T> C,
                View<const T> grad_F_proj, View<const T> grad_tau, View<T> grad_F_trial,
-               View<T> grad_C, T* accumulator, T* weight_sums) const override {
+               View<T> grad_C, T* accumulator, T* weight_sums,
+               const LawMemoryAdjoint<T>&) const override {
     T* planes = scratch_of_thread<T>(6 * kPlanesOfTile + table_.scratch(law_));
     T* scratch = planes + 6 * kPlanesOfTile;
     for (std::ptrdiff_t p = 0; p < count; p += kTile) {

@@ -13,8 +13,16 @@ namespace uniphy::kernels {
 inline constexpr int kChunk = static_cast<int>(kLawChunk);
 
 /// Planes of one chunk of the state: position x (m), velocity v (m/s), affine velocity C (1/s),
-/// deformation gradient F; matrices row-major.
-enum StatePlane { kPlaneX = 0, kPlaneV = 3, kPlaneC = 6, kPlaneF = 15, kStatePlanes = 24 };
+/// deformation gradient F, matrices row-major; memory of the law, used where some body of a
+/// roll-out has one.
+enum StatePlane {
+  kPlaneX = 0,
+  kPlaneV = 3,
+  kPlaneC = 6,
+  kPlaneF = 15,
+  kPlaneMemory = 24,
+  kStatePlanes = 25
+};
 
 inline constexpr int kStateChunkSize = kStatePlanes * kChunk;
 inline constexpr int kMatrixChunkSize = 9 * kChunk;

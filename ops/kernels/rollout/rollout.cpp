@@ -29,6 +29,7 @@ void check_state(const ParticleState<T>& state, std::ptrdiff_t particles) {
   check_size("v", state.v, 3 * particles);
   check_size("C", state.C, 9 * particles);
   check_size("F", state.F, 9 * particles);
+  if (!state.memory.empty()) check_size("memory", state.memory, particles);
 }
 
 void check_steps(std::ptrdiff_t steps, std::ptrdiff_t every, std::ptrdiff_t least_every) {
@@ -60,10 +61,17 @@ Rollout<T>::Rollout(const GridSettings& grid, std::vector<BodyRange<T>> bodies, 
 }
 
 template <class T>
+bool Rollout<T>::has_memory() const {
+  return std::any_of(bodies_.begin(), bodies_.end(),
+                     [](const auto& body) { return body.law->has_memory(); });
+}
+
+template <class T>
 std::ptrdiff_t Rollout<T>::run(ParticleState<T>& state, std::ptrdiff_t steps,
                                const RunOptions<T>& options) const {
   check_state(state, particles());
   check_steps(steps, options.every, 0);
+  if (has_memory()) state.memory.resize(particles(), T(0));
   const bool frames = options.every > 0 && options.on_frame;
   ParticleState<T> frame;
   frame.x.resize(3 * particles());
@@ -119,6 +127,7 @@ void Rollout<T>::record(const ParticleState<T>& initial, std::ptrdiff_t steps, s
 
   RolloutEngine<T> engine(*this);
   ParticleState<T> state = initial, frame;
+  if (has_memory()) state.memory.resize(particles(), T(0));
   for (std::ptrdiff_t done = 0;;) {
     if (done % segment == 0) {
       if (done > 0) engine.store(state);
@@ -155,6 +164,7 @@ RolloutGradient<T> Rollout<T>::adjoint(const RolloutTape<T>& tape, const T* grad
   grad.v.assign(3 * particles(), T(0));
   grad.C.assign(9 * particles(), T(0));
   grad.F.assign(9 * particles(), T(0));
+  if (has_memory()) grad.memory.assign(particles(), T(0));
   if (tape.steps % tape.every == 0) {
     const std::ptrdiff_t at = tape.steps / tape.every * 3 * particles();
     if (grad_x != nullptr) std::copy_n(grad_x + at, 3 * particles(), grad.x.begin());

@@ -81,6 +81,9 @@ class Rollout {
   const std::vector<T>& mass() const { return mass_; }
   const std::vector<T>& volume() const { return volume_; }
 
+  /// Whether some body's law has memory. Then states have it: an empty one is filled with zeros.
+  bool has_memory() const;
+
   /// Advances `state` by `steps` steps, or until a callback says stop; returns the steps done.
   std::ptrdiff_t run(ParticleState<T>& state, std::ptrdiff_t steps,
                      const RunOptions<T>& options = {}) const;

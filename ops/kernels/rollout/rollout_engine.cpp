@@ -32,6 +32,7 @@ RolloutEngine<T>::RolloutEngine(const Rollout<T>& rollout)
       mass_(chunks() * std::ptrdiff_t(kChunk)),
       volume_(chunks() * std::ptrdiff_t(kChunk)),
       states_(chunks() * std::ptrdiff_t(kStateChunkSize), Pages::huge),
+      keep_memory_(rollout.has_memory()),
       transfer_(chunks(), Pages::huge),
       grid_nodes_(grid_size(rollout.grid().n)),
       accumulator_(order_.bodies()),
@@ -63,6 +64,8 @@ void RolloutEngine<T>::load(const ParticleState<T>& state, std::ptrdiff_t histor
   order_.load(state.v.data(), 3, planes + kPlaneV * kChunk, kStateChunkSize);
   order_.load(state.C.data(), 9, planes + kPlaneC * kChunk, kStateChunkSize);
   order_.load(state.F.data(), 9, planes + kPlaneF * kChunk, kStateChunkSize);
+  if (keep_memory_)
+    order_.load(state.memory.data(), 1, planes + kPlaneMemory * kChunk, kStateChunkSize);
 }
 
 template <class T>
@@ -75,6 +78,7 @@ void RolloutEngine<T>::store(ParticleState<T>& state) const {
   put(kPlaneV, 3, state.v);
   put(kPlaneC, 9, state.C);
   put(kPlaneF, 9, state.F);
+  if (keep_memory_) put(kPlaneMemory, 1, state.memory);
 }
 
 template <class T>
@@ -89,10 +93,17 @@ void RolloutEngine<T>::begin_step(int chunk, std::ptrdiff_t s) {
   const int next = after(chunk);
   table_.deformation_update(from, count, constants_, F_trial);
   prefetch(state(s, next) + kPlaneF * kChunk, kMatrixChunkSize * sizeof(T));
+  LawMemory<T> memory;
+  if (law_has_memory(chunk)) {
+    memory = {plane_view<const T>(from + kPlaneMemory * kChunk),
+              plane_view(to + kPlaneMemory * kChunk)};
+  } else if (keep_memory_ && keep_history_) {
+    std::copy_n(from + kPlaneMemory * kChunk, kChunk, to + kPlaneMemory * kChunk);
+  }
   rollout_.bodies()[order_.body(chunk)].law->evaluate(
       count, constants_.dt, plane_view<const T>(F_trial),
       plane_view<const T>(from + kPlaneC * kChunk), plane_view(to + kPlaneF * kChunk),
-      plane_view(tau));
+      plane_view(tau), memory);
   prefetch(transfer_[next].record, sizeof(transfer_[next].record));
   table_.p2g_records(from, tau, mass(chunk), volume(chunk), constants_, &transfer_[chunk]);
 }

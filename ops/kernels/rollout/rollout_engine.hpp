@@ -77,6 +77,10 @@ class RolloutEngine {
   int threads() const;
   void throw_if_lost(std::ptrdiff_t step);
 
+  bool law_has_memory(int chunk) const {
+    return rollout_.bodies()[order_.body(chunk)].law->has_memory();
+  }
+
   void begin_step(int chunk, std::ptrdiff_t s);
   void transfer_layers(std::ptrdiff_t s, int part, int parts);
   void end_step(int chunk, std::ptrdiff_t s);
@@ -97,6 +101,7 @@ class RolloutEngine {
   AlignedBuffer<T> stresses_{0, Pages::huge},
       F_trials_;  ///< [steps][chunks][9][kChunk], where kept
   bool keep_history_ = false, keep_F_trial_ = false;
+  const bool keep_memory_;  ///< some body has one
   AlignedBuffer<TransferChunk<T>> transfer_;
   AlignedBuffer<T> grid_nodes_, grad_nodes_;
   GridPlan plan_;

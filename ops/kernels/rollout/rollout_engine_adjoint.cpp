@@ -110,11 +110,17 @@ void RolloutEngine<T>::end_backward_step(int chunk, std::ptrdiff_t s) {
   table_.deformation_update(from, count, constants_, F_trial);
   T* grad_F = grad + kPlaneF * kChunk;
   T* grad_C = grad + kPlaneC * kChunk;
+  LawMemoryAdjoint<T> memory;
+  if (law_has_memory(chunk)) {
+    T* grad_memory = grad + kPlaneMemory * kChunk;
+    memory = {plane_view<const T>(from + kPlaneMemory * kChunk), plane_view<const T>(grad_memory),
+              plane_view(grad_memory)};
+  }
   rollout_.bodies()[order_.body(chunk)].law->adjoint(
       count, constants_.dt, plane_view<const T>(F_trial),
       plane_view<const T>(from + kPlaneC * kChunk), plane_view<const T>(grad_F),
       plane_view<const T>(grad_tau), plane_view(grad_F), plane_view(grad_C),
-      accumulators_.data() + accumulator_start_[chunk], weight_sums_of(chunk));
+      accumulators_.data() + accumulator_start_[chunk], weight_sums_of(chunk), memory);
   table_.deformation_update_adjoint(from, count, constants_, grad_F, grad_C, grad_F);
 }
 
@@ -144,6 +150,8 @@ void RolloutEngine<T>::backward(ParticleState<T>& grad, std::ptrdiff_t first_ste
   order_.load(grad.v.data(), 3, grads_.data() + kPlaneV * kChunk, kStateChunkSize);
   order_.load(grad.C.data(), 9, grads_.data() + kPlaneC * kChunk, kStateChunkSize);
   order_.load(grad.F.data(), 9, grads_.data() + kPlaneF * kChunk, kStateChunkSize);
+  if (keep_memory_)
+    order_.load(grad.memory.data(), 1, grads_.data() + kPlaneMemory * kChunk, kStateChunkSize);
 
   TeamBarrier barrier;
 #pragma omp parallel num_threads(threads())
@@ -173,6 +181,8 @@ void RolloutEngine<T>::backward(ParticleState<T>& grad, std::ptrdiff_t first_ste
   order_.store(grads_.data() + kPlaneV * kChunk, kStateChunkSize, 3, grad.v.data());
   order_.store(grads_.data() + kPlaneC * kChunk, kStateChunkSize, 9, grad.C.data());
   order_.store(grads_.data() + kPlaneF * kChunk, kStateChunkSize, 9, grad.F.data());
+  if (keep_memory_)
+    order_.store(grads_.data() + kPlaneMemory * kChunk, kStateChunkSize, 1, grad.memory.data());
   for (int c = 0; c < chunks(); ++c) {
     std::vector<double>& sum = accumulator_[order_.body(c)];
     const std::ptrdiff_t begin = accumulator_start_[c], size = accumulator_start_[c + 1] - begin;

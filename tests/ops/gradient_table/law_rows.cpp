@@ -37,19 +37,24 @@ void add_rows_of(LawId id, Stage stage, Isa isa, std::mt19937_64& random,
   std::string names;
   for (const kernels::LawParameter& p : kernels::law_parameters(id))
     names += (names.empty() ? "" : ", ") + std::string(p.name);
-  GradientRow of_F{op, "F", {}}, of_C{op, "C", {}}, of_parameters{op, names, {}};
+  GradientRow of_F{op, "F", {}}, of_C{op, "C", {}}, of_parameters{op, names, {}},
+      of_memory{op, "memory", {}};
   const auto worst = [](double& slot, double value) { slot = std::max(slot, value); };
+  const bool has_memory = kernels::law_has_memory(id) && stage != Stage::stress;
   for (const DeformationCase& c : cases_of(sample_law(id))) {
-    const LawGradientCheck check = make_check(id, stage, isa, random);
+    LawGradientCheck check = make_check(id, stage, isa, random);
+    if (has_memory) check.memory = 0.03;
     const auto e =
         check.errors(c.F, random_matrix(random, 3), parameter_array(sample_law(id)), c.step);
     worst(of_F.errors[c.group], e.F);
     if (det(c.F) > 0.1) worst(of_C.errors[c.group], e.C);
     worst(of_parameters.errors[c.group], e.parameters);
+    worst(of_memory.errors[c.group], e.memory);
   }
   rows.push_back(of_F);
   if (id == LawId::newtonian && stage != Stage::project) rows.push_back(of_C);
   if (stage != Stage::project || is_plastic(id)) rows.push_back(of_parameters);
+  if (has_memory) rows.push_back(of_memory);
 }
 
 }  // namespace

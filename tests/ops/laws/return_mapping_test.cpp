@@ -20,7 +20,7 @@ using torch::Tensor;
 constexpr double kDt = 1e-4;
 
 class ReturnMappingOp : public AnalyticLaws {};
-INSTANTIATE_TEST_SUITE_P(All, ReturnMappingOp, ::testing::ValuesIn(analytic_laws()),
+INSTANTIATE_TEST_SUITE_P(All, ReturnMappingOp, ::testing::ValuesIn(laws_without_memory()),
                          [](const auto& info) {
                            return std::string(kernels::law_name(info.param));
                          });
@@ -96,6 +96,85 @@ TEST_P(ReturnMappingOp, TakesAnyLayoutAndAnyCount) {
   EXPECT_TRUE(torch::equal(map(strided), map(F)));
   EXPECT_EQ(map(F.slice(0, 0, 0)).sizes(), torch::IntArrayRef({0, 3, 3}));
   EXPECT_TRUE(torch::equal(map(F.slice(0, 3, 4)), map(F).slice(0, 3, 4)));
+}
+
+// ---- with memory --------------------------------------------------------------------------------
+
+constexpr LawId kCorrected = LawId::volume_corrected_sand;
+
+/// Between nothing and more than the strain of any state.
+Tensor memories(const Tensor& F) {
+  torch::manual_seed(21);
+  return torch::rand({F.size(0)}, torch::kFloat64).pow(3);
+}
+
+TEST(ReturnMappingWithMemory, AgreesWithTheReferenceInValueAndGradient) {
+  const Tensor F = separated_states().set_requires_grad(true);
+  const Tensor memory = memories(F).set_requires_grad(true);
+  const MaterialLeaves leaves(sample_law(kCorrected));
+  const auto found = ops::return_mapping_with_memory(kCorrected, F, memory, leaves.material(), kDt);
+  const auto expected =
+      ops::reference::return_mapping_with_memory(kCorrected, F, memory, leaves.material());
+  EXPECT_LE(relative_difference(found.F_proj, expected.F_proj), 4e-14);
+  EXPECT_LE((found.memory - expected.memory).abs().max().item<double>(), 4e-15);
+  EXPECT_GT((found.memory > 0).sum().item<int64_t>(), 5);
+  EXPECT_GT((found.memory == 0).sum().item<int64_t>(), 5);
+  const auto single =
+      ops::return_mapping_with_memory(kCorrected, F.to(torch::kFloat32), memory.to(torch::kFloat32),
+                                      ops::material_of(sample_law(kCorrected)), kDt);
+  EXPECT_EQ(single.memory.scalar_type(), torch::kFloat32);
+  EXPECT_LE(relative_difference(single.F_proj.to(torch::kFloat64), expected.F_proj), 5e-6);
+  torch::manual_seed(22);
+  const Tensor W = torch::randn_like(F), w = torch::randn_like(memory);
+  const auto loss = [&](const ops::MemoryMapping& m) {
+    return (m.F_proj * W).sum() + (m.memory * w).sum();
+  };
+  for (const Tensor& leaf : {F, memory}) {
+    const Tensor g = torch::autograd::grad({loss(found)}, {leaf}, {}, true)[0];
+    const Tensor r = torch::autograd::grad({loss(expected)}, {leaf}, {}, true)[0];
+    EXPECT_GT(g.abs().max().item<double>(), 0.1);
+    for (int64_t p = 0; p < F.size(0); ++p)
+      EXPECT_LE((g[p] - r[p]).norm().item<double>(), 1e-12 * (1 + r[p].norm().item<double>())) << p;
+  }
+  EXPECT_LE(relative_difference(leaves.gradient(loss(found)), leaves.gradient(loss(expected))),
+            3e-13);
+}
+
+TEST(ReturnMappingWithMemory, SameBitsOnOneThreadAndTwo) {
+  torch::manual_seed(5);
+  const Tensor memory = torch::rand({5000}).set_requires_grad(true);
+  expect_same_bits_on_threads(
+      sample_law(kCorrected), [&](const Tensor& F, const ops::Material& material) {
+        const auto m = ops::return_mapping_with_memory(kCorrected, F, memory, material, kDt);
+        return m.F_proj * m.memory.view({-1, 1, 1});
+      });
+}
+
+TEST(ReturnMappingWithMemory, EitherAnswerMayBeTheOneThatIsAskedFor) {
+  const Tensor F = separated_states().set_requires_grad(true);
+  const Tensor memory = memories(F).set_requires_grad(true);
+  const ops::Material material = ops::material_of(sample_law(kCorrected));
+  const auto m = ops::return_mapping_with_memory(kCorrected, F, memory, material, kDt);
+  const auto by_memory = torch::autograd::grad({m.memory.sum()}, {F, memory}, {}, true);
+  EXPECT_EQ(by_memory[1].min().item<double>(), 0);  // given back
+  EXPECT_EQ(by_memory[1].max().item<double>(), 1);  // kept
+  const auto by_F = torch::autograd::grad({m.F_proj.sum()}, {F, memory}, {}, true);
+  const auto both = torch::autograd::grad({m.F_proj.sum() + m.memory.sum()}, {F, memory});
+  for (int i : {0, 1})
+    EXPECT_LE((by_memory[i] + by_F[i] - both[i]).abs().max().item<double>(), 1e-12);
+}
+
+TEST(ReturnMappingWithMemory, RefusesBadArguments) {
+  const Tensor F = separated_states(), memory = memories(F);
+  const ops::Material good = ops::material_of(sample_law(LawId::sand));
+  EXPECT_THAT(error_of([&] { ops::return_mapping_with_memory(LawId::sand, F, memory, good, kDt); }),
+              HasSubstr("return_mapping_with_memory: law: expected one with memory, found sand"));
+  EXPECT_THAT(error_of([&] { ops::return_mapping(kCorrected, F, good, kDt); }),
+              HasSubstr("return_mapping: law: expected one without memory"));
+  EXPECT_THAT(error_of([&] {
+                ops::return_mapping_with_memory(kCorrected, F, memory.slice(0, 1), good, kDt);
+              }),
+              HasSubstr("memory: expected [32] Double on cpu, found [31]"));
 }
 
 TEST(ReturnMappingOp, RefusesBadArguments) {

@@ -32,9 +32,14 @@ struct Differentiated {
     }
     leaves.insert(leaves.end(), {scene.x, scene.v, scene.C, scene.F, body.parameters});
     names.insert(names.end(), {"x", "v", "C", "F", "parameters"});
+    if (scene.memory.defined()) {
+      leaves.push_back(scene.memory);
+      names.push_back("memory");
+    }
     for (Tensor& leaf : leaves) leaf.requires_grad_();
-    frames = (stepwise ? stepwise_rollout : ops::rollout)(
-        scene.x, scene.v, scene.C, scene.F, scene.mass, scene.volume, {body}, scene.settings);
+    frames = (stepwise ? stepwise_rollout : ops::rollout)(scene.x, scene.v, scene.C, scene.F,
+                                                          scene.mass, scene.volume, {body},
+                                                          scene.settings, scene.memory);
   }
   std::vector<Tensor> gradients() const {
     return torch::autograd::grad({testing::loss_of(frames.x) + 0.01 * testing::loss_of(frames.v)},
@@ -65,21 +70,20 @@ TEST_P(StepwiseRollout, AgreesWithTheFusedOneInValueAndGradient) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(, StepwiseRollout, ::testing::Range(0, 9), [](const auto& info) {
+INSTANTIATE_TEST_SUITE_P(, StepwiseRollout, ::testing::Range(0, 10), [](const auto& info) {
   return testing::rollout_materials()[info.param].name;
 });
 
 TEST(StepwiseRolloutOfSeveral, BodiesEachFollowTheirLaw) {
-  const RolloutScene scene;
   const auto materials = testing::rollout_materials();
-  const std::int64_t P = scene.x.size(0);
-  std::vector<ops::RolloutBody> bodies;
-  for (const int i : {0, 2}) {
-    bodies.push_back({i == 0 ? 0 : 50, i == 0 ? 50 : P, materials[i].law, materials[i].parameters});
-  }
+  const RolloutMaterial &solid = materials[0], &sand = materials[7];
+  ASSERT_TRUE(kernels::law_has_memory(sand.law.id));
+  const RolloutScene scene = testing::scene_of(sand);
+  const std::vector<ops::RolloutBody> bodies{{0, 50, solid.law, solid.parameters},
+                                             {50, scene.x.size(0), sand.law, sand.parameters}};
   const auto x = [&](const auto& roll) {
     return roll(scene.x, scene.v, Tensor(), Tensor(), scene.mass, scene.volume, bodies,
-                scene.settings)
+                scene.settings, scene.memory)
         .x;
   };
   EXPECT_LE((x(stepwise_rollout) - x(ops::rollout)).abs().max().item<double>(), 1e-12);

@@ -46,7 +46,8 @@ Trajectory example(std::int64_t frames, std::int64_t particles) {
   t.v = random_numbers(frames * particles * 3, 4);
   t.F = random_numbers(frames * particles * 9, 5);
   t.last = {random_numbers(particles * 3, 6), random_numbers(particles * 3, 7),
-            random_numbers(particles * 9, 8), random_numbers(particles * 9, 9)};
+            random_numbers(particles * 9, 8), random_numbers(particles * 9, 9),
+            random_numbers(particles, 10)};
   return t;
 }
 
@@ -69,6 +70,7 @@ TEST(Trajectory, ReadsBackToTheSameBits) {
   EXPECT_EQ(read.scene, written.scene);
   EXPECT_EQ(read.last.x, written.last.x);
   EXPECT_EQ(read.last.C, written.last.C);
+  EXPECT_EQ(read.last.memory, written.last.memory);
   EXPECT_EQ(read.positions(2), read.x.data() + 42);
 
   const Trajectory positions = read_trajectory(scratch.file("t.h5"), true);

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "ops/kernels/base/error.hpp"
+#include "tests/support/error_of.hpp"
 #include "tests/support/random_weights.hpp"
 #include "uniphy/io/latent_file.hpp"
 #include "uniphy/io/model_file.hpp"
@@ -59,6 +60,24 @@ class LearnedLaw : public ::testing::Test {
   std::filesystem::path folder_;
   LatentFile fitted_;
 };
+
+TEST(AnalyticLaw, SandHasTheVolumeCorrectionUnlessItSaysOtherwise) {
+  const auto id_of = [](const std::string& keys) {
+    const Config config = Config::parse("law: {" + keys + "}");
+    Section root = config.root();
+    Section law = root.section("law", "");
+    const LawSource source = read_law(law);
+    config.finish();
+    return source.load().id;
+  };
+  const std::string sand = "type: sand, mu: 1e5, lambda: 2e5, theta: 0.3";
+  EXPECT_EQ(id_of(sand), kernels::LawId::volume_corrected_sand);
+  EXPECT_EQ(id_of(sand + ", volume_correction: true"), kernels::LawId::volume_corrected_sand);
+  EXPECT_EQ(id_of(sand + ", volume_correction: false"), kernels::LawId::sand);
+  EXPECT_THAT(
+      testing::error_of([&] { id_of("type: volume_corrected_sand, mu: 1, lambda: 1, theta: 1"); }),
+      HasSubstr("volume_corrected_sand"));
+}
 
 TEST_F(LearnedLaw, TakesACodeOfTheModel) {
   const auto law = load(model_key() + ", latent: {type: code, index: 2}");

@@ -60,7 +60,7 @@ TEST(ReadScene, ReadsEveryKey) {
   EXPECT_EQ(body.density, 900);
   EXPECT_EQ(body.velocity, Eigen::Vector3d(1, 2, 3));
   EXPECT_EQ(body.angular_velocity, Eigen::Vector3d(4, 5, 6));
-  EXPECT_EQ(body.law.id, kernels::LawId::sand);
+  EXPECT_EQ(body.law.id, kernels::LawId::volume_corrected_sand);  // the option's default
   EXPECT_EQ(body.law.theta, 0.3);
   EXPECT_EQ(place_body(body).x.size(), 3u * 6 * 3);
 }

@@ -6,11 +6,13 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 
 #include "ops/kernels/base/error.hpp"
 #include "tests/uniphy/support/limits.hpp"
 #include "uniphy/geometry/shape_catalogue.hpp"
+#include "uniphy/geometry/shapes/box.hpp"
 
 namespace uniphy {
 namespace {
@@ -230,6 +232,37 @@ TEST(RunScene, ABodyOnTheFloorStaysThereButForItsSag) {
   // At rest the centre of a column sinks by ρ g H²/(3 E) = 0.2 mm; let go at once, by twice that.
   EXPECT_LT(sag, 1e-3);
   EXPECT_GT(sag, 1e-5);
+}
+
+/// The height of the middle 90 % of the particles, m.
+double height_of(const std::vector<double>& x) {
+  std::vector<double> y;
+  for (std::size_t k = 1; k < x.size(); k += 3) y.push_back(x[k]);
+  std::sort(y.begin(), y.end());
+  return y[y.size() * 95 / 100] - y[y.size() * 5 / 100];
+}
+
+// A layer of sand across the box, dropped at 0 or 3 m/s. What it is made of stays as much as it
+// was: 0.14 m, of which 90 % are 0.126 m. Without the correction every separation adds to it.
+TEST(RunScene, SandKeepsItsVolumeWhateverItFellFrom) {
+  BodyDescription layer = ball({0.5, 0.35, 0.5}, 0.7);
+  layer.solid = std::make_shared<Box>(Vector3d{1, 0.2, 1});
+  layer.filling = {Filling::Kind::spacing, 0, 0.035};
+  layer.law.mu = layer.law.lambda = 1e5;
+  layer.law.theta = 0.35;
+  const auto height = [&](kernels::LawId id, double speed) {
+    layer.law.id = id;
+    layer.velocity[1] = -speed;
+    SceneDescription scene = one(layer);
+    scene.dt = 4e-4;
+    scene.steps = 2500;
+    return height_of(run_scene(scene).last.x);
+  };
+  for (const double speed : {0.0, 3.0}) {
+    const double corrected = height(kernels::LawId::volume_corrected_sand, speed);
+    EXPECT_NEAR(corrected, 0.126, 0.006) << speed;
+    EXPECT_GT(height(kernels::LawId::sand, speed), corrected + 0.01) << speed;
+  }
 }
 
 TEST(PlaceScene, LetsStatesOfEarlierRunsLeanOnTheWalls) {

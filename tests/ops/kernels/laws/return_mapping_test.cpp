@@ -17,7 +17,8 @@ using kernels::LawId;
 
 class Plastic : public ::testing::TestWithParam<LawId> {};
 INSTANTIATE_TEST_SUITE_P(All, Plastic,
-                         ::testing::Values(LawId::plasticine, LawId::sand, LawId::non_newtonian),
+                         ::testing::Values(LawId::plasticine, LawId::sand, LawId::non_newtonian,
+                                           LawId::volume_corrected_sand),
                          [](const auto& info) {
                            return std::string(kernels::law_name(info.param));
                          });
@@ -75,7 +76,7 @@ TEST_P(Plastic, FlipsAreConfinedToTheBand) {
     const double off = (i % 2 ? 1 : -1) * std::pow(10.0, -15 + 5.0 * i / count);
     const Matrix F = strained(k * (1 + off), t, random);
     Matrix projected;
-    entry.project(1, parameters, 1e-4, {F.data(), 9, 1}, {projected.data(), 9, 1});
+    entry.project(1, parameters, 1e-4, {F.data(), 9, 1}, {projected.data(), 9, 1}, {});
     const bool yielded = projected != F;
     if (yielded != (off > 0)) {
       ++flips;
@@ -85,7 +86,7 @@ TEST_P(Plastic, FlipsAreConfinedToTheBand) {
     const Matrix W = random_matrix(random);
     Matrix grad;
     entry.project_adjoint(1, parameters, 1e-4, {F.data(), 9, 1}, {W.data(), 9, 1},
-                          {grad.data(), 9, 1}, nullptr);
+                          {grad.data(), 9, 1}, nullptr, {});
     EXPECT_EQ(grad == W, !yielded);
   }
   EXPECT_LE(flips, count / 4);
@@ -102,6 +103,96 @@ TEST(DruckerPrager, TensionLeavesARotation) {
     EXPECT_NEAR(det(state.F_proj), 1, 1e-14);
     EXPECT_LE(norm(state.tau), 1e-9);
   }
+}
+
+// ---- sand with volume correction ----------------------------------------------------------------
+
+/// One particle through one step of the law.
+struct Corrected {
+  Matrix F_proj{}, tau{};
+  double memory = 0;
+};
+Corrected corrected_step(const kernels::LawKernel<double>& law, const Matrix& F, double before) {
+  Corrected r;
+  law.evaluate(1, 1e-4, {F.data(), 9, 1}, {}, {r.F_proj.data(), 9, 1}, {r.tau.data(), 9, 1},
+               {{&before, 1, 1}, {&r.memory, 1, 1}});
+  return r;
+}
+
+// Tampubolon et al. 2017: the mapping of sand at ε + v_c/3, and v_c += tr ε − tr ε'.
+TEST(VolumeCorrectedSand, ProjectsTheShiftedStrainAndKeepsTheRest) {
+  LawDescription d = sample_law(LawId::volume_corrected_sand);
+  std::mt19937_64 random(61);
+  for (const Isa isa : kernels::available_isas()) {
+    const auto law = kernels::make_analytic_law<double>(d, isa);
+    LawDescription plain = d;
+    plain.id = LawId::sand;
+    const auto sand = kernels::make_analytic_law<double>(plain, isa);
+    for (int i = 0; i < 200; ++i) {
+      const double before = i % 4 == 0 ? 0 : 0.05 * (i % 4);
+      const Matrix F = strained(0.02 * (i % 7), 0.1 * (i % 5) - 0.25, random);
+      const double trial = hencky_tensor(F).trace();
+      const Matrix shifted = F * std::exp(before / 3);  // the same U and V
+      const LawState expected = apply_law(*sand, 1e-4, shifted);
+      const Corrected found = corrected_step(*law, F, before);
+      EXPECT_LE(norm(found.F_proj - expected.F_proj), 1e-14);
+      EXPECT_LE(norm(found.tau - expected.tau), 1e-13 * d.lambda);
+      const double kept = before + trial - hencky_tensor(found.F_proj).trace();
+      EXPECT_NEAR(found.memory, kept, 1e-14);
+      EXPECT_GE(found.memory, 0);
+      if (before == 0 && found.memory == 0 && apply_law(*sand, 1e-4, F).F_proj == F) {
+        EXPECT_EQ(found.F_proj, F);  // the bits of F inside
+      }
+    }
+  }
+}
+
+// What the law exists for. A particle is pulled apart, step by step, and pushed back to where it
+// was: with the correction it bears nothing on the way and is as it was at the end; without, it is
+// crushed by all that it had gained.
+TEST(VolumeCorrectedSand, GivesBackTheVolumeThatASeparationGained) {
+  const LawDescription d = sample_law(LawId::volume_corrected_sand);
+  const auto law = kernels::make_analytic_law<double>(d);
+  Corrected state{identity(), {}, 0};
+  const auto stretch = [&](double by) {
+    state = corrected_step(*law, state.F_proj * std::exp(by / 3), state.memory);
+  };
+  for (int i = 0; i < 20; ++i) stretch(0.05);
+  EXPECT_NEAR(state.memory, 1.0, 1e-14);
+  for (int i = 0; i < 19; ++i) {
+    stretch(-0.05);
+    EXPECT_EQ(norm(state.tau), 0) << i;
+  }
+  stretch(-0.05);
+  EXPECT_NEAR(state.memory, 0, 1e-14);
+  EXPECT_LE(norm(state.F_proj - identity()), 1e-14);
+  stretch(-0.05);
+  EXPECT_NEAR(state.tau[0] + state.tau[4] + state.tau[8], (2 * d.mu + 3 * d.lambda) * -0.05, 1e-8);
+}
+
+TEST(VolumeCorrectedSand, GradientsMatchCentralDifferencesAtEveryMemory) {
+  const LawDescription d = sample_law(LawId::volume_corrected_sand);
+  std::mt19937_64 random(63);
+  int reached = 0;
+  for (const Isa isa : kernels::available_isas()) {
+    for (const double memory : {0.0, 0.004, 0.03, 0.7}) {
+      for (const Stage stage : {Stage::project, Stage::fused}) {
+        for (const DeformationCase& c : cases_of(d)) {
+          LawGradientCheck check = make_check(d.id, stage, isa, random);
+          check.memory = memory;
+          if (memory == 0 && is_clamped(c)) continue;
+          const auto e = check.errors(c.F, Matrix{}, parameter_array(d), c.step);
+          EXPECT_LE(e.worst(), 1e-6) << stage_name(stage) << ", " << c.group << ", " << memory;
+          double by_memory = 0;
+          Matrix grad_F, grad_C;
+          ParameterArray grad;
+          check.adjoint(c.F, Matrix{}, parameter_array(d), grad_F, grad_C, grad, &by_memory);
+          if (std::abs(by_memory) > 1e-3) ++reached;
+        }
+      }
+    }
+  }
+  EXPECT_GT(reached, 100);
 }
 
 TEST(Viscoplastic, IsPlasticineAtZeroViscosity) {

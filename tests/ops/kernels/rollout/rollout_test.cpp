@@ -9,6 +9,7 @@
 
 #include "ops/kernels/base/error.hpp"
 #include "tests/ops/kernels/rollout/simple_law.hpp"
+#include "tests/support/error_of.hpp"
 #include "tests/support/finite_differences.hpp"
 
 namespace uniphy::kernels {
@@ -26,6 +27,7 @@ struct TwoBodies {
   GridSettings grid;
   std::vector<T> mass, volume;
   ParticleState<T> state;
+  T chi = 0;  ///< Pa; above 0, the second body has memory
   double parameters[2][4] = {{1e5, 2e5, 300, 0.01}, {3e4, 5e4, 100, 0.02}};
 
   explicit TwoBodies(std::ptrdiff_t count, unsigned seed = 1) : particles(count) {
@@ -50,8 +52,13 @@ struct TwoBodies {
     std::vector<BodyRange<T>> bodies;
     for (int b = 0; b < 2; ++b) {
       const double* p = parameters[b];
-      bodies.push_back({b == 0 ? 0 : particles / 3, b == 0 ? particles / 3 : particles,
-                        std::make_shared<SimpleLaw<T>>(p[0], p[1], p[2], p[3])});
+      std::shared_ptr<const LawKernel<T>> law =
+          std::make_shared<SimpleLaw<T>>(p[0], p[1], p[2], p[3]);
+      if (b == 1 && chi > 0) {
+        law = std::make_shared<SimpleMemoryLaw<T>>(SimpleLaw<T>(p[0], p[1], p[2], p[3]), chi);
+      }
+      bodies.push_back(
+          {b == 0 ? 0 : particles / 3, b == 0 ? particles / 3 : particles, std::move(law)});
     }
     return {grid, bodies, mass, volume};
   }
@@ -87,12 +94,21 @@ struct Loss {
   }
 };
 
-class RolloutGradientTest : public ::testing::TestWithParam<std::pair<Wall, std::ptrdiff_t>> {};
+struct GradientCase {
+  Wall wall;
+  std::ptrdiff_t steps;
+  double chi = 0;
+};
+class RolloutGradientTest : public ::testing::TestWithParam<GradientCase> {};
 
 TEST_P(RolloutGradientTest, AgreesWithCentralDifferences) {
   TwoBodies<double> scene(150);
-  scene.grid.wall = GetParam().first;
-  const Loss<double> loss{GetParam().second, 7};
+  scene.grid.wall = GetParam().wall;
+  scene.chi = GetParam().chi;
+  if (scene.chi > 0) {
+    for (int p = 0; p < 150; ++p) scene.state.memory.push_back(0.01 * p);
+  }
+  const Loss<double> loss{GetParam().steps, 7};
   RolloutGradient<double> g;
   loss(scene.rollout(), scene.state, &g);
 
@@ -105,8 +121,12 @@ TEST_P(RolloutGradientTest, AgreesWithCentralDifferences) {
     double step;
   };
   using State = ParticleState<double>;
-  for (const Part& part : {Part{"x", &State::x, 1e-6}, Part{"v", &State::v, 1e-4},
-                           Part{"C", &State::C, 1e-2}, Part{"F", &State::F, 1e-5}}) {
+  std::vector<Part> parts{{"x", &State::x, 1e-6},
+                          {"v", &State::v, 1e-4},
+                          {"C", &State::C, 1e-2},
+                          {"F", &State::F, 1e-5}};
+  if (scene.chi > 0) parts.push_back({"memory", &State::memory, 1e-3});
+  for (const Part& part : parts) {
     for (int repeat = 0; repeat < 3; ++repeat) {
       const std::vector<double>& at = scene.state.*part.member;
       std::vector<double> direction(at.size());
@@ -144,10 +164,11 @@ TEST_P(RolloutGradientTest, AgreesWithCentralDifferences) {
 // 50 steps are two segments, of which the second is not full; 64 end on a segment, 71 between
 // frames; 0 leave only the first frame.
 INSTANTIATE_TEST_SUITE_P(, RolloutGradientTest,
-                         ::testing::Values(std::pair{Wall::freeslip, 50},
-                                           std::pair{Wall::noslip, 50},
-                                           std::pair{Wall::freeslip, 64},
-                                           std::pair{Wall::freeslip, 71}));
+                         ::testing::Values(GradientCase{Wall::freeslip, 50},
+                                           GradientCase{Wall::noslip, 50},
+                                           GradientCase{Wall::freeslip, 64},
+                                           GradientCase{Wall::freeslip, 71},
+                                           GradientCase{Wall::freeslip, 71, 1e4}));
 
 TEST(Rollout, GradientOfNoStepsIsThatOfTheFrame) {
   TwoBodies<double> scene(20);
@@ -233,6 +254,40 @@ TYPED_TEST(RolloutOfType, FramesAndSamplesDoNotChangeTheRun) {
   EXPECT_EQ(frames.front(), 100);
   EXPECT_EQ(frames.back(), 169);
   EXPECT_EQ(samples, (std::vector<std::ptrdiff_t>{100, 109, 118, 127, 136, 145, 154, 163}));
+}
+
+// What the law remembers goes along when particles are sorted again, and stays with its body; a
+// state without memory begins at 0, and one that is handed on goes on to the same bits.
+TYPED_TEST(RolloutOfType, CarriesTheMemoryOfALaw) {
+  using T = TypeParam;
+  TwoBodies<T> scene(300);
+  scene.chi = 1e4;
+  const Rollout<T> rollout = scene.rollout();
+  EXPECT_TRUE(rollout.has_memory());
+  ParticleState<T> whole = scene.state, parts = scene.state, zero = scene.state;
+  rollout.run(whole, 96);
+  ASSERT_EQ(whole.memory.size(), 300u);
+  for (int p = 0; p < 100; ++p) EXPECT_EQ(whole.memory[p], T(0));
+  for (int p = 100; p < 300; ++p) EXPECT_GT(whole.memory[p], T(2));  // towards tr F
+  zero.memory.assign(300, T(0));
+  rollout.run(zero, 96);
+  EXPECT_EQ(zero.memory, whole.memory);
+  EXPECT_EQ(zero.x, whole.x);
+  rollout.run(parts, 32);
+  rollout.run(parts, 64);
+  EXPECT_EQ(parts.memory, whole.memory);
+  EXPECT_EQ(parts.x, whole.x);
+  // It matters.
+  ParticleState<T> forgetful = scene.state;
+  rollout.run(forgetful, 32);
+  forgetful.memory.clear();
+  rollout.run(forgetful, 64);
+  EXPECT_NE(forgetful.x, whole.x);
+
+  ParticleState<T> bad = scene.state;
+  bad.memory.assign(7, T(0));
+  EXPECT_THAT(testing::error_of([&] { rollout.run(bad, 1); }),
+              HasSubstr("expected 300 numbers in memory, found 7"));
 }
 
 TYPED_TEST(RolloutOfType, RecordsTheFramesOfTheRun) {

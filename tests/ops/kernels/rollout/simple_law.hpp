@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cmath>
+#include <vector>
 
 #include "ops/kernels/laws/law.hpp"
 
@@ -21,7 +22,7 @@ class SimpleLaw : public LawKernel<T> {
   }
 
   void evaluate(std::ptrdiff_t count, T, View<const T> F_trial, View<const T> C, View<T> F_proj,
-                View<T> tau) const override {
+                View<T> tau, const LawMemory<T>& = {}) const override {
     for (std::ptrdiff_t p = 0; p < count; ++p) {
       T F[9];
       project(F_trial, p, F);
@@ -40,7 +41,8 @@ class SimpleLaw : public LawKernel<T> {
 
   void adjoint(std::ptrdiff_t count, T, View<const T> F_trial, View<const T> C,
                View<const T> grad_F_proj, View<const T> grad_tau, View<T> grad_F_trial,
-               View<T> grad_C, T* accumulator, T*) const override {
+               View<T> grad_C, T* accumulator, T* = nullptr,
+               const LawMemoryAdjoint<T>& = {}) const override {
     for (std::ptrdiff_t p = 0; p < count; ++p) {
       T F[9], g[9], cofactor[9], sum[4] = {0, 0, 0, 0};
       project(F_trial, p, F);
@@ -94,6 +96,54 @@ class SimpleLaw : public LawKernel<T> {
   }
 
   T mu_, lambda_, zeta_, beta_;
+};
+
+/// The same with a smooth memory: m' = 0.95 m + 0.05 tr F_trial, and χ m' 1 is added to the stress.
+template <class T>
+class SimpleMemoryLaw final : public LawKernel<T> {
+ public:
+  SimpleMemoryLaw(const SimpleLaw<T>& law, T chi) : law_(law), chi_(chi) {}
+
+  std::ptrdiff_t parameter_size() const override { return 4; }
+  std::ptrdiff_t accumulator_size() const override { return 4; }
+  void parameter_gradient(const T* accumulator, T* gradient) const override {
+    law_.parameter_gradient(accumulator, gradient);
+  }
+  bool has_memory() const override { return true; }
+
+  void evaluate(std::ptrdiff_t count, T dt, View<const T> F_trial, View<const T> C, View<T> F_proj,
+                View<T> tau, const LawMemory<T>& memory) const override {
+    std::vector<T> after(count);
+    for (std::ptrdiff_t p = 0; p < count; ++p) {
+      after[p] =
+          T(0.95) * memory.before(p, 0) + T(0.05) * (F_trial(p, 0) + F_trial(p, 4) + F_trial(p, 8));
+    }
+    law_.evaluate(count, dt, F_trial, C, F_proj, tau);
+    for (std::ptrdiff_t p = 0; p < count; ++p) {
+      memory.after(p, 0) = after[p];
+      for (int a = 0; a < 3; ++a) tau(p, 4 * a) += chi_ * after[p];
+    }
+  }
+
+  void adjoint(std::ptrdiff_t count, T dt, View<const T> F_trial, View<const T> C,
+               View<const T> grad_F_proj, View<const T> grad_tau, View<T> grad_F_trial,
+               View<T> grad_C, T* accumulator, T*,
+               const LawMemoryAdjoint<T>& memory) const override {
+    std::vector<T> g(count);
+    for (std::ptrdiff_t p = 0; p < count; ++p) {
+      g[p] = memory.grad_after(p, 0);
+      for (int a = 0; a < 3; ++a) g[p] += chi_ * grad_tau(p, 4 * a);
+    }
+    law_.adjoint(count, dt, F_trial, C, grad_F_proj, grad_tau, grad_F_trial, grad_C, accumulator);
+    for (std::ptrdiff_t p = 0; p < count; ++p) {
+      memory.grad_before(p, 0) = T(0.95) * g[p];
+      for (int a = 0; a < 3; ++a) grad_F_trial(p, 4 * a) += T(0.05) * g[p];
+    }
+  }
+
+ private:
+  SimpleLaw<T> law_;
+  T chi_;
 };
 
 }  // namespace uniphy::kernels
