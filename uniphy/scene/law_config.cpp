@@ -85,7 +85,8 @@ LawSource read_law(Section& law) {
   LawSource source;
   std::vector<Variant> variants;
   const char* docs[] = {"neo-Hookean solid",
-                        "weakly compressible viscous fluid",
+                        "weakly compressible viscous fluid; its bulk stiffness is lambda + 2/3 mu, "
+                        "as published, Pa added to Pa s: the numbers hold for seconds alone",
                         "elastoplastic, von Mises yield",
                         "elastoplastic, Drucker-Prager yield",
                         "viscoplastic, von Mises yield",

@@ -45,8 +45,10 @@ SceneDescription read_scene_settings(Section& scene) {
   SceneDescription settings;
   settings.grid.n =
       static_cast<int>(scene.integer("grid", 20, between(8, 1024), "", "nodes a side"));
-  settings.dt = scene.real_or("auto", "dt", std::optional<double>(), between(kLeastTimeStep, 1),
-                              "s", "time step; auto: from sound speed, viscosity and speed");
+  settings.dt =
+      scene.real_or("auto", "dt", std::optional<double>(), between(kLeastTimeStep, 1), "s",
+                    "time step; auto: from sound speed, viscosity and speed. Results do not "
+                    "settle as it shrinks: the transfer damps a little in every step");
   settings.safety = scene.real("safety", kTimeStepSafety, Range{0, 1, true, false}, "",
                                "share of the stable time step that auto takes");
   settings.steps = scene.integer("steps", 1000, between(0, 1e9), "", "number of time steps");
