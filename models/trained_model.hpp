@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <string>
 
 #include "models/latent_codes.hpp"
@@ -16,7 +17,8 @@ struct TrainedModel {
 
 TrainedModel trained_model(const ModelFile& file, torch::Dtype dtype = torch::kFloat32);
 
-/// config: the YAML that trained it.
-ModelFile model_file(const TrainedModel& model, const std::string& config);
+/// config: the YAML that trained it; training_dt: see ModelFile.
+ModelFile model_file(const TrainedModel& model, const std::string& config,
+                     const std::array<double, 2>& training_dt = {});
 
 }  // namespace uniphy::models

@@ -255,7 +255,8 @@ TEST(TrainedModel, GoesThroughAModelFile) {
   EXPECT_EQ(model.codes->size(), 3);
   EXPECT_EQ(model.codes->latent_size(), 5);
   EXPECT_TRUE(model.codes->z.requires_grad());
-  const ModelFile file = model_file(model, "seed: 1\n");
+  const ModelFile file = model_file(model, "seed: 1\n", {1e-4, 2e-4});
+  EXPECT_EQ(file.training_dt, (std::array<double, 2>{1e-4, 2e-4}));
   EXPECT_EQ(file.config, "seed: 1\n");
   const TrainedModel again = trained_model(file);
   EXPECT_TRUE(torch::equal(again.codes->z, model.codes->z));

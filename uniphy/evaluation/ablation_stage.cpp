@@ -80,7 +80,8 @@ Metrics make(const AblationVariant& variant, const AblationOptions& o, const Hel
   const LawColumns heldout_columns = law_columns(heldout.data, training.law.form);
   const TrainingResult result = train(data, training, out.file("checkpoint.pt"), &heldout_columns);
   const models::TrainedModel& model = result.model;
-  write_model(out.file("model.h5"), models::model_file(model, out.config_yaml()), true);
+  write_model(out.file("model.h5"), models::model_file(model, out.config_yaml(), time_steps(data)),
+              true);
   write_training_curves(out, result.history);
   Metrics metrics;
   metrics.set("parameters", double(model.law->parameter_count()));

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "ops/kernels/base/error.hpp"
 
 namespace uniphy {
@@ -91,6 +93,14 @@ void DatasetWriter::finish() {
                 {"1", "which draw of the trajectory it is, counted from 0"});
   writer_.write_strings("trajectories/shape", shape, {"1", "name of the shape"});
   writer_.commit();
+}
+
+std::array<double, 2> time_steps(const Dataset& data) {
+  if (data.trajectories.empty()) return {};
+  const auto [shortest, longest] = std::minmax_element(
+      data.trajectories.begin(), data.trajectories.end(),
+      [](const TrajectoryRecord& a, const TrajectoryRecord& b) { return a.dt < b.dt; });
+  return {shortest->dt, longest->dt};
 }
 
 Dataset read_dataset(const std::filesystem::path& file) {

@@ -64,6 +64,9 @@ struct Dataset {
   std::string config;
 };
 
+/// Shortest and longest time step of its trajectories, s.
+std::array<double, 2> time_steps(const Dataset& data);
+
 /// Trajectory by trajectory, so that the memory holds one of them.
 class DatasetWriter {
  public:

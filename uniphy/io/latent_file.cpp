@@ -58,6 +58,8 @@ void write_latent(const std::filesystem::path& file, const LatentFile& latent) {
   writer.attribute("/", "version", 1);
   writer.attribute("/", "law", latent.law);
   writer.attribute("/", "config", latent.config);
+  if (latent.dt > 0) writer.attribute("/", "dt", latent.dt);
+  writer.attribute("/", "determined", latent.determined ? 1 : 0);
   if (latent.law == "learned") {
     writer.attribute("/", "model", latent.model);
     writer.write("z", latent.z, {static_cast<std::int64_t>(latent.z.size())}, {"1", "latent code"});
@@ -92,6 +94,16 @@ LatentFile read_latent(const std::filesystem::path& file) {
   LatentFile latent;
   latent.law = reader.attribute_text("/", "law");
   latent.config = reader.attribute_text("/", "config");
+  if (reader.has_attribute("/", "dt")) {
+    latent.dt = reader.attribute_real("/", "dt");
+    if (!(latent.dt >= kLeastTimeStep && latent.dt <= 1)) {
+      reader.fail("attribute dt of /", fmt::format("expected a time step from {} to 1 s, found {}",
+                                                   kLeastTimeStep, latent.dt));
+    }
+  }
+  if (reader.has_attribute("/", "determined")) {
+    latent.determined = reader.attribute_integer("/", "determined") != 0;
+  }
   if (latent.law == "learned") {
     latent.model = reader.attribute_text("/", "model");
     latent.z = reader.read<double>("z", {-1}, hdf5::Values::finite);

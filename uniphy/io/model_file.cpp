@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include "ops/kernels/base/error.hpp"
 #include "uniphy/io/hdf5.hpp"
 #include "uniphy/io/physical_limits.hpp"
@@ -96,6 +98,10 @@ void write_model(const std::filesystem::path& file, const ModelFile& model, bool
   writer.attribute("/", "stress_units", "Pa");
   writer.attribute("/", "rate_units", "1/s");
   writer.attribute("/", "config", model.config);
+  if (model.training_dt[0] > 0) {
+    writer.attribute("/", "training_dt",
+                     std::vector<double>(model.training_dt.begin(), model.training_dt.end()));
+  }
   if (single_precision) {
     write_network<float>(writer, "/projection", weights.projection);
     write_network<float>(writer, "/stress", weights.stress);
@@ -145,6 +151,16 @@ ModelFile read_model(const std::filesystem::path& file) {
   });
 
   model.config = reader.attribute_text("/", "config");
+  if (reader.has_attribute("/", "training_dt")) {
+    const std::vector<double> dt = reader.attribute_reals("/", "training_dt", 2);
+    if (!(dt[0] > 0 && dt[0] <= dt[1] && std::isfinite(dt[1]))) {
+      reader.fail(
+          "attribute training_dt",
+          fmt::format("expected two time steps > 0 s, the shorter one first, found {} and {}",
+                      dt[0], dt[1]));
+    }
+    model.training_dt = {dt[0], dt[1]};
+  }
   model.materials = reader.read_strings("latents/material");
   const std::int64_t count = model.codes();
   model.latents = reader.read<double>("latents/z", {count, size}, hdf5::Values::finite);

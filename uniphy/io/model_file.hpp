@@ -4,7 +4,9 @@
 //
 //   attributes  format = "uniphy-model", version = 1, form = "isotropic" | "published",
 //               latent_size, activation = "gelu" | "silu" | "squareplus", dtype = "float64",
-//               stress_units = "Pa", rate_units = "1/s", config = YAML that trained it
+//               stress_units = "Pa", rate_units = "1/s", config = YAML that trained it,
+//               training_dt [2] = shortest and longest time step (s) of the training trajectories;
+//               a file without it does not know
 //   /projection/layer_k/weight [out, in], bias [out]   k = 0, 1, ...
 //   /stress/layer_k/weight     [out, in], bias [out]
 //   /latents/z          [N, latent_size]
@@ -14,6 +16,7 @@
 // The inputs of the first layers, their order and units:
 // ops/kernels/learned/learned_law_weights.hpp.
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -30,6 +33,7 @@ struct ModelFile {
   std::vector<std::string> materials;          ///< [N]
   std::vector<MaterialParameters> parameters;  ///< [N]
   std::string config;
+  std::array<double, 2> training_dt{};  ///< s; 0: not known
 
   std::int64_t codes() const { return static_cast<std::int64_t>(materials.size()); }
   /// Code i, latent_size numbers.

@@ -47,7 +47,8 @@ RunFunction train_stage(Section& config) {
     metrics.set("train_s", result.seconds);
     metrics.set("parameters", double(model.law->parameter_count()));
     metrics.set("loss", result.history.back().loss);
-    write_model(out.file("model.h5"), models::model_file(model, out.config_yaml()), true);
+    write_model(out.file("model.h5"),
+                models::model_file(model, out.config_yaml(), time_steps(data)), true);
     write_training_curves(out, result.history);
     plot_latents(out, model.codes);
     const auto weights = std::make_shared<kernels::LearnedLawWeights>(model.law->weights());

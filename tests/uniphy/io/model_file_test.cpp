@@ -46,6 +46,7 @@ ModelFile example(kernels::LawForm form = kernels::LawForm::isotropic) {
   model.parameters = {no_parameters(), no_parameters()};
   model.parameters[1][3] = 0.25;
   model.config = "epochs: 5\n";
+  model.training_dt = {1e-4, 2e-4};
   return model;
 }
 
@@ -70,6 +71,7 @@ TEST(ModelFile, ReadsBackToTheSameBitsInBothForms) {
     EXPECT_TRUE(std::isnan(read.parameters[1][0]));
     EXPECT_EQ(read.parameters[1][3], 0.25);
     EXPECT_EQ(read.config, "epochs: 5\n");
+    EXPECT_EQ(read.training_dt, written.training_dt);
     EXPECT_EQ(read.codes(), 2);
     EXPECT_THAT(read.code(1), ::testing::ElementsAre(5, 6, 7, 8));
     EXPECT_EQ(testing::error_of([&] { read.code(2); }), "latent 2: expected an index from 0 to 1");
