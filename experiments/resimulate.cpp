@@ -38,10 +38,13 @@ int main(int argc, char** argv) {
         const uniphy::SimulationOutput output = uniphy::read_simulation_output(config);
         return [=](uniphy::RunDirectory& out, uniphy::Metrics& metrics) {
           uniphy::SceneDescription scene = source.load();
-          const auto law = uniphy::load_fitted_law(latent, model);
+          uniphy::LawOrigin origin;
+          const auto law = uniphy::load_fitted_law(latent, model, &origin);
           for (uniphy::BodyDescription& body : scene.bodies) {
             const bool chosen = std::find(bodies.begin(), bodies.end(), body.name) != bodies.end();
-            if (bodies.empty() || chosen) body.law = law;
+            if (!bodies.empty() && !chosen) continue;
+            body.law = law;
+            body.law_origin = origin;
           }
           uniphy::simulate_into(scene, output, out, metrics);
         };

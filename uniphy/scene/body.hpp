@@ -9,6 +9,7 @@
 #include "ops/kernels/laws/law.hpp"
 #include "uniphy/geometry/particle_cloud.hpp"
 #include "uniphy/geometry/solid.hpp"
+#include "uniphy/scene/law_origin.hpp"
 
 namespace uniphy {
 
@@ -56,6 +57,7 @@ struct BodyDescription {
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();          ///< m/s
   Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();  ///< rad/s
   kernels::LawDescription law;
+  LawOrigin law_origin;
 };
 
 /// How a body's own frame stands in the scene: x = centre + s R (p − own centre).

@@ -111,10 +111,11 @@ LawSource read_law(Section& law) {
   return source;
 }
 
-LawDescription LawSource::load() const {
+LawDescription LawSource::load(LawOrigin* origin) const {
   if (description.id != LawId::learned) return description;
-  if (latent == Latent::file) return load_fitted_law(latent_file, model);
+  if (latent == Latent::file) return load_fitted_law(latent_file, model, origin);
   const ModelFile file = read_model(model);
+  if (origin != nullptr) *origin = {LawOrigin::Kind::trained, file.training_dt};
   LawDescription law = description;
   law.weights = std::make_shared<kernels::LearnedLawWeights>(file.weights);
   if (latent == Latent::code) {
@@ -132,10 +133,13 @@ LawDescription LawSource::load() const {
 }
 
 LawDescription load_fitted_law(const std::filesystem::path& latent,
-                               const std::filesystem::path& model) {
+                               const std::filesystem::path& model, LawOrigin* origin) {
   const std::filesystem::path file =
       std::filesystem::is_directory(latent) ? latent / "latent.h5" : latent;
   const LatentFile fitted = read_latent(file);
+  if (origin != nullptr) {
+    *origin = {LawOrigin::Kind::fitted, {fitted.dt, fitted.dt}, fitted.determined};
+  }
   if (fitted.law != kernels::law_name(LawId::learned)) return fitted.analytic;
   const std::filesystem::path found = model.empty() ? find_model(file, fitted.model) : model;
   LawDescription law;

@@ -7,6 +7,7 @@
 
 #include "ops/kernels/laws/law_parameters.hpp"
 #include "uniphy/config/config.hpp"
+#include "uniphy/scene/law_origin.hpp"
 
 namespace uniphy {
 
@@ -26,9 +27,9 @@ struct LawSource {
   std::vector<double> z;
   std::filesystem::path latent_file;
 
-  /// The law with weights and latent code. Throws Error naming the file, and the index or the
-  /// length that does not fit.
-  kernels::LawDescription load() const;
+  /// The law with weights and latent code; `origin`, unless null, receives where it comes from.
+  /// Throws Error naming the file, and the index or the length that does not fit.
+  kernels::LawDescription load(LawOrigin* origin = nullptr) const;
 };
 
 /// The values that a parameter of an analytic law may take.
@@ -43,8 +44,10 @@ LawSource read_law(Section& law);
 
 /// The fitted law in `latent` (latent.h5, or the folder that holds it). Its model is `model`, or,
 /// where that is empty, the one that the latent file names, looked for as written, beside the
-/// latent file, and as model.h5 beside it.
+/// latent file, and as model.h5 beside it. `origin`, unless null, receives what the file says of
+/// the fit.
 kernels::LawDescription load_fitted_law(const std::filesystem::path& latent,
-                                        const std::filesystem::path& model = {});
+                                        const std::filesystem::path& model = {},
+                                        LawOrigin* origin = nullptr);
 
 }  // namespace uniphy

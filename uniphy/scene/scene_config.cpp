@@ -120,7 +120,7 @@ SceneDescription SceneSource::load() const {
     BodyDescription body = source.description;
     try {
       source.shape(&body);
-      if (with_laws_) body.law = source.law.load();
+      if (with_laws_) body.law = source.law.load(&body.law_origin);
     } catch (const Error& error) {
       throw Error(fmt::format("body \"{}\": {}", body.name, error.what()));
     }

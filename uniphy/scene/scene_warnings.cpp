@@ -101,6 +101,16 @@ std::vector<double> body_gaps(const PlacedScene& placed, double reach) {
   return gaps;
 }
 
+std::optional<std::string> sparse_warning(std::int64_t particles, double volume, double dx) {
+  const double cells = volume / (dx * dx * dx);
+  const double density = static_cast<double>(particles) / cells;
+  if (density >= 1 - 1e-9) return {};
+  return fmt::format(
+      "{} particles are {:.2g} a grid cell, and a body of less than one falls apart as dust; "
+      "expected at least {:.0f}, better {:.0f} (8 a cell), or a coarser grid",
+      particles, density, std::ceil(cells), std::ceil(kGoodPerCell * cells));
+}
+
 std::vector<std::string> scene_warnings(const SceneDescription& scene, const PlacedScene& placed) {
   std::vector<std::string> warnings;
   // The margin is the user's to use up; the limit itself is not.
@@ -110,15 +120,18 @@ std::vector<std::string> scene_warnings(const SceneDescription& scene, const Pla
         "dt is {:.3g} s, beyond the stable {:.3g} s; the run may blow up (auto takes {:.3g} s)",
         placed.grid.dt, limit, placed.stable_dt));
   }
-  const std::vector<double> density = particles_per_cell(placed);
-  for (std::size_t b = 0; b < density.size(); ++b) {
-    if (density[b] >= 1 - 1e-9) continue;
-    const double cells = volume_of(placed, b) / std::pow(placed.grid.dx(), 3);
-    warnings.push_back(fmt::format(
-        "body \"{}\": {} particles are {:.2g} a grid cell, and a body of less than one falls apart "
-        "as dust; expected at least {:.0f}, better {:.0f} (8 a cell), or a coarser grid",
-        scene.bodies[b].name, count_of(placed, b), density[b], std::ceil(cells),
-        std::ceil(kGoodPerCell * cells)));
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
+    const BodyDescription& body = scene.bodies[b];
+    const auto warn = [&](const std::optional<std::string>& text) {
+      if (text) warnings.push_back(fmt::format("body \"{}\": {}", body.name, *text));
+    };
+    warn(sparse_warning(count_of(placed, b), volume_of(placed, b), placed.grid.dx()));
+    warn(time_step_warning(body.law, body.law_origin, placed.grid.dt));
+    if (!body.law_origin.determined) {
+      warn(
+          "its law was fitted to a motion that did not show the material (no wall acted); any "
+          "other would have fitted as well");
+    }
   }
   const std::vector<double> gaps = body_gaps(placed, kSharedCells);
   for (std::size_t a = 0; a < scene.bodies.size(); ++a) {

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,10 +17,15 @@ std::vector<double> particles_per_cell(const PlacedScene& placed);
 /// than `reach` cells. [bodies, bodies], symmetric.
 std::vector<double> body_gaps(const PlacedScene& placed, double reach);
 
+/// Of a body of less than one particle a cell of width dx (m), which falls apart as its cells
+/// empty: how many there are in a cell, and the number to ask for. volume in m³.
+std::optional<std::string> sparse_warning(std::int64_t particles, double volume, double dx);
+
 /// What is physically doubtful about a scene that can run, a sentence each:
 ///   - a time step beyond the stable one;
-///   - a body of less than one particle a cell, which falls apart as its cells empty, with the
-///     number of particles to ask for;
+///   - a body of less than one particle a cell (sparse_warning);
+///   - a law at another time step than that of its training or its fit (time_step_warning), or
+///     fitted to a motion that did not show the material;
 ///   - two bodies that do not touch and are nearer than kSharedCells: their particles move nodes of
 ///     the grid that both read, so that they drag each other along and stick when they part.
 std::vector<std::string> scene_warnings(const SceneDescription& scene, const PlacedScene& placed);

@@ -103,6 +103,32 @@ TEST_F(LearnedLaw, TakesAFittedLatentFromItsFileOrFolder) {
               HasSubstr("missing.h5"));
 }
 
+TEST_F(LearnedLaw, SaysWhereItComesFrom) {
+  ModelFile model = read_model(folder_ / "model.h5");
+  model.training_dt = {1e-4, 2e-4};
+  write_model(folder_ / "model.h5", model);
+  fitted_.dt = 5e-4;
+  fitted_.determined = false;
+  write_latent(folder_ / "fit" / "latent.h5", fitted_);
+  const auto origin_of = [&](const std::string& keys) {
+    const Config config = Config::parse("law: {type: learned, " + keys + "}");
+    Section root = config.root();
+    Section law = root.section("law", "");
+    LawOrigin origin;
+    read_law(law).load(&origin);
+    return origin;
+  };
+  const LawOrigin code = origin_of(model_key());
+  EXPECT_EQ(code.kind, LawOrigin::Kind::trained);
+  EXPECT_EQ(code.dt, (std::array<double, 2>{1e-4, 2e-4}));
+  EXPECT_TRUE(code.determined);
+  const LawOrigin fit =
+      origin_of("latent: {type: fitted, path: " + (folder_ / "fit").string() + "}");
+  EXPECT_EQ(fit.kind, LawOrigin::Kind::fitted);
+  EXPECT_EQ(fit.dt, (std::array<double, 2>{5e-4, 5e-4}));
+  EXPECT_FALSE(fit.determined);
+}
+
 TEST_F(LearnedLaw, FindsTheModelBesideTheLatentFile) {
   fitted_.model = "moved/away.h5";
   write_latent(folder_ / "fit" / "latent.h5", fitted_);

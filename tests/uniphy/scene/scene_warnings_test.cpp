@@ -72,5 +72,19 @@ TEST(SceneWarnings, ATimeStepBeyondTheStableOne) {
   EXPECT_THAT(warnings_of(scene), ElementsAre(HasSubstr("beyond the stable")));
 }
 
+TEST(SceneWarnings, ALawFittedAtAnotherTimeStepOrToNothing) {
+  SceneDescription scene = scene_of({box("b", 0.5, 0.5, 10)}, 20);  // at 1e-4 s
+  LawOrigin& origin = scene.bodies[0].law_origin;
+  origin = {LawOrigin::Kind::fitted, {1e-4, 1e-4}};
+  EXPECT_THAT(warnings_of(scene), IsEmpty());
+  origin.dt = {5e-4, 5e-4};
+  EXPECT_THAT(
+      warnings_of(scene),
+      ElementsAre(AllOf(HasSubstr("body \"b\": its law was fitted at a time step of 0.0005"),
+                        HasSubstr("dt is 0.0001"))));
+  origin = {LawOrigin::Kind::fitted, {1e-4, 1e-4}, false};
+  EXPECT_THAT(warnings_of(scene), ElementsAre(HasSubstr("did not show the material")));
+}
+
 }  // namespace
 }  // namespace uniphy
