@@ -18,18 +18,8 @@ namespace {
 using Eigen::Map;
 using Eigen::Vector3d;
 
-Vector3d centre_of_mass(const Observation& observation, std::ptrdiff_t frame) {
-  const double* x = observation.positions(frame);
-  Vector3d sum = Vector3d::Zero();
-  double total = 0;
-  for (std::int64_t p = 0; p < observation.particles; ++p) {
-    sum += observation.volume[p] * Map<const Vector3d>(x + 3 * p);
-    total += observation.volume[p];
-  }
-  return sum / total;
-}
-
 constexpr std::int64_t kMaximumSteps = 10000000;  ///< of an observation
+constexpr double kContactCells = 0.01;  ///< off the free flight, in cells, where a wall acts
 
 /// Where gravity alone takes a point within `steps` steps: the time stepping is symplectic.
 Vector3d fall(const kernels::GridSettings& grid, std::ptrdiff_t steps) {
@@ -51,7 +41,41 @@ std::vector<double> fly(const kernels::Rollout<double>& rollout, const Observati
   return result;
 }
 
+/// True where one free flight, its start fitted to all frames, explains the path of the centre of
+/// mass: to 1 % of a cell, or, up to 10 %, but for what jumps from frame to frame as noise does and
+/// no motion.
+bool flies_freely(const Observation& observation, const ObservedSteps& steps,
+                  const kernels::GridSettings& grid) {
+  const auto frames = static_cast<Eigen::Index>(observation.frames);
+  Eigen::Matrix<double, Eigen::Dynamic, 2> basis(frames, 2);
+  Eigen::Matrix<double, Eigen::Dynamic, 3> path(frames, 3);
+  for (Eigen::Index f = 0; f < frames; ++f) {
+    basis.row(f) << 1, static_cast<double>(steps.step[f]) / static_cast<double>(steps.step.back());
+    path.row(f) = centre_of_mass(observation, f) - fall(grid, steps.step[f]);
+  }
+  const Eigen::Matrix<double, 2, 3> start =
+      (basis.transpose() * basis).ldlt().solve(basis.transpose() * path);
+  path -= basis * start;
+  const double largest = path.rowwise().norm().maxCoeff();
+  if (largest <= kContactCells * grid.dx()) return true;
+  // J. von Neumann, Ann. Math. Stat. 12 (1941): 2 for white noise, 0 for a smooth path.
+  const double jumps =
+      (path.bottomRows(frames - 1) - path.topRows(frames - 1)).squaredNorm() / path.squaredNorm();
+  return largest <= 10 * kContactCells * grid.dx() && jumps > 1;
+}
+
 }  // namespace
+
+Vector3d centre_of_mass(const Observation& observation, std::ptrdiff_t frame) {
+  const double* x = observation.positions(frame);
+  Vector3d sum = Vector3d::Zero();
+  double total = 0;
+  for (std::int64_t p = 0; p < observation.particles; ++p) {
+    sum += observation.volume[p] * Map<const Vector3d>(x + 3 * p);
+    total += observation.volume[p];
+  }
+  return sum / total;
+}
 
 ObservedSteps observed_steps(const Observation& observation, const std::string& name) {
   ObservedSteps result;
@@ -154,10 +178,11 @@ RigidMotion observed_motion(const Observation& observation, const ObservedSteps&
 
 std::ptrdiff_t first_contact(const Observation& observation, const ObservedSteps& steps,
                              const kernels::GridSettings& grid, const RigidMotion& motion) {
+  if (flies_freely(observation, steps, grid)) return observation.frames;
   for (std::ptrdiff_t f = 1; f < observation.frames; ++f) {
     const double t = static_cast<double>(steps.step[f]) * grid.dt;
     const Vector3d free = motion.centre + t * motion.linear + fall(grid, steps.step[f]);
-    if ((centre_of_mass(observation, f) - free).norm() > 0.01 * grid.dx()) return f;
+    if ((centre_of_mass(observation, f) - free).norm() > kContactCells * grid.dx()) return f;
   }
   return observation.frames;
 }

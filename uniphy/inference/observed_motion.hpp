@@ -26,6 +26,9 @@ kernels::GridSettings observed_grid(const Observation& observation, const std::s
 /// kg of each particle: density × volume.
 std::vector<double> observed_mass(const Observation& observation);
 
+/// Of the particles at a frame, m.
+Eigen::Vector3d centre_of_mass(const Observation& observation, std::ptrdiff_t frame);
+
 /// Largest side of the box round the particles at the first frame, m.
 double observed_size(const Observation& observation);
 
@@ -41,7 +44,8 @@ RigidMotion observed_motion(const Observation& observation, const ObservedSteps&
                             const kernels::GridSettings& grid, int frames);
 
 /// The first frame at which the centre of mass has left the parabola of free flight by more than
-/// 1 % of a cell: a wall acts. The number of frames where that never happens.
+/// 1 % of a cell: a wall acts. The number of frames where that never happens, or where another
+/// parabola explains all frames (the motion of the first ones is noisy).
 std::ptrdiff_t first_contact(const Observation& observation, const ObservedSteps& steps,
                              const kernels::GridSettings& grid, const RigidMotion& motion);
 

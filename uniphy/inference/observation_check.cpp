@@ -1,0 +1,196 @@
+#include "uniphy/inference/observation_check.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "ops/kernels/base/statistics.hpp"
+
+namespace uniphy {
+namespace {
+
+using Eigen::Map;
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+/// Largest angle (rad) that the body has turned by at the last frame that is looked at.
+constexpr double kSmallAngle = 0.2;
+/// Residual over size that is no matter: an initial strain of a ten-thousandth, or rounding.
+constexpr double kSmallResidual = 1e-4;
+/// Residual over the mean that noise leaves. Of 64 particles the root scatters by 5 %.
+constexpr double kNoiseMargin = 1.5;
+/// Part of the kinetic energy that a gain has to exceed: a centre of mass that is seen at a few
+/// instants has other speeds than it had between them.
+constexpr double kEnergyMargin = 0.1;
+
+Map<const Vector3d> at(const Observation& o, std::ptrdiff_t frame, std::int64_t particle) {
+  return Map<const Vector3d>(o.positions(frame) + 3 * particle);
+}
+
+/// True where no particle of the frame reads a node that a wall stops.
+bool out_of_reach(const Observation& o, const kernels::GridSettings& grid, std::ptrdiff_t frame) {
+  const double low = grid.bound + 0.5, high = grid.n - grid.bound - 0.5;  // in cells
+  const double* x = o.positions(frame);
+  return std::all_of(x, x + 3 * o.particles,
+                     [&](double c) { return c * grid.n >= low && c * grid.n < high; });
+}
+
+/// Root of the mean square, over particles and coordinates, of what the best rotation and
+/// translation leave between the first frame and another. W. Kabsch, Acta Cryst. A32 (1976).
+double rigid_residual(const Observation& o, std::ptrdiff_t frame) {
+  const Vector3d from = centre_of_mass(o, 0), to = centre_of_mass(o, frame);
+  Matrix3d moment = Matrix3d::Zero();
+  for (std::int64_t p = 0; p < o.particles; ++p) {
+    moment += o.volume[p] * (at(o, frame, p) - to) * (at(o, 0, p) - from).transpose();
+  }
+  const Eigen::JacobiSVD<Matrix3d> svd(moment, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Matrix3d flip = Matrix3d::Identity();
+  flip(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
+  const Matrix3d R = svd.matrixU() * flip * svd.matrixV().transpose();
+  double sum = 0, total = 0;
+  for (std::int64_t p = 0; p < o.particles; ++p) {
+    sum += o.volume[p] * (at(o, frame, p) - to - R * (at(o, 0, p) - from)).squaredNorm();
+    total += o.volume[p];
+  }
+  return std::sqrt(sum / (3 * total));
+}
+
+/// Σ m |ω × (x − centre)|² / Σ m at the first frame.
+double square_of_turning(const Observation& o, const RigidMotion& motion) {
+  double sum = 0, total = 0;
+  for (std::int64_t p = 0; p < o.particles; ++p) {
+    sum += o.volume[p] * motion.angular.cross(at(o, 0, p) - motion.centre).squaredNorm();
+    total += o.volume[p];
+  }
+  return sum / total;
+}
+
+/// Noise of the path c [frames, points, 3].
+double noise_of(const std::vector<double>& time, const double* c, std::int64_t points) {
+  constexpr std::int64_t kEnough = 1000000;  // numbers that a median is taken of
+  const std::int64_t stride =
+      std::max<std::int64_t>(1, static_cast<std::int64_t>(time.size()) * 3 * points / kEnough);
+  std::vector<double> seen;
+  for (std::size_t f = 0; f + 3 < time.size(); ++f) {
+    std::array<double, 4> weight;
+    double square = 0;
+    for (int i = 0; i < 4; ++i) {
+      double product = 1;
+      for (int j = 0; j < 4; ++j) {
+        if (j != i) product *= (time[f + i] - time[f + j]) / (time[f + 3] - time[f]);
+      }
+      weight[i] = 1 / product;
+      square += weight[i] * weight[i];
+    }
+    for (std::int64_t k = 0; k < 3 * points; k += stride) {
+      double difference = 0;
+      for (int i = 0; i < 4; ++i) difference += weight[i] * c[(f + i) * 3 * points + k];
+      seen.push_back(std::abs(difference) / std::sqrt(square));
+    }
+  }
+  constexpr double kMedianOfNormal = 0.6745;  // of |x| for a standard deviation of 1
+  return seen.empty() ? 0 : kernels::median(seen) / kMedianOfNormal;
+}
+
+void check_start(const Observation& o, const ObservedSteps& steps,
+                 const kernels::GridSettings& grid, const RigidMotion& motion,
+                 ObservationCheck& check) {
+  const double turning = motion.angular.norm();
+  const auto angle = [&](std::ptrdiff_t f) {
+    return turning * static_cast<double>(steps.step[f]) * grid.dt;
+  };
+  const std::ptrdiff_t most = std::min<std::ptrdiff_t>(kStartFrames, o.frames - 1);
+  while (check.free_frames < most && out_of_reach(o, grid, check.free_frames) &&
+         out_of_reach(o, grid, check.free_frames + 1) &&
+         (check.free_frames == 0 || angle(check.free_frames + 1) < kSmallAngle)) {
+    ++check.free_frames;
+  }
+  // A spinning body without stress flies apart along tangents, which is ½ (ωt)² r outwards; one
+  // with stress ends up between that and a rotation. The first transfer to the grid and back takes
+  // the more of the rotation the nearer a particle is to the surface, which is a part of ωt Δx.
+  const double arm = turning > 0 ? std::sqrt(square_of_turning(o, motion)) / turning : 0;
+  double worst = -1;
+  for (std::ptrdiff_t f = 1; f <= std::max<std::ptrdiff_t>(check.free_frames, 1); ++f) {
+    const double residual = rigid_residual(o, f);
+    const double spin = (0.5 * angle(f) * angle(f) * arm + angle(f) * grid.dx()) / std::sqrt(3.0);
+    const double allowed =
+        kNoiseMargin * std::sqrt(2.0) * check.noise + spin + kSmallResidual * check.size;
+    if (residual - allowed > worst || f == 1) {
+      worst = residual - allowed;
+      check.start_residual = residual;
+      check.start_allowed = allowed;
+    }
+  }
+}
+
+void check_energy(const Observation& o, const kernels::GridSettings& grid,
+                  const RigidMotion& motion, ObservationCheck& check) {
+  std::vector<double> path;
+  for (std::int64_t f = 0; f < o.frames; ++f) {
+    const Vector3d c = centre_of_mass(o, f) - motion.centre;
+    path.insert(path.end(), c.data(), c.data() + 3);
+  }
+  const double noise = std::min(noise_of(o.time, path.data(), 1), check.noise);
+  const Map<const Vector3d> gravity(grid.gravity);
+  const double first = 0.5 * (motion.linear.squaredNorm() + square_of_turning(o, motion));
+  double shortest = o.time[1] - o.time[0];
+  check.kinetic = 0.5 * motion.linear.squaredNorm();
+  for (std::int64_t f = 1; f < o.frames; ++f) {
+    const Map<const Vector3d> before(path.data() + 3 * (f - 1)), now(path.data() + 3 * f);
+    const double t = o.time[f] - o.time[f - 1];
+    shortest = std::min(shortest, t);
+    const double kinetic = 0.5 * ((now - before) / t).squaredNorm();
+    const double gain = kinetic - 0.5 * gravity.dot(now + before) - first;
+    check.kinetic = std::max(check.kinetic, kinetic);
+    check.energy_gain = f == 1 ? gain : std::max(check.energy_gain, gain);
+  }
+  // Both speeds are differences of two noisy positions; the largest of many is looked at.
+  const double speed_noise = 4 * std::sqrt(2.0) * noise / shortest;
+  check.energy_allowed = kEnergyMargin * check.kinetic +
+                         2 * std::sqrt(2 * check.kinetic) * speed_noise + speed_noise * speed_noise;
+}
+
+}  // namespace
+
+double observed_noise(const Observation& observation) {
+  return noise_of(observation.time, observation.x.data(), observation.particles);
+}
+
+ObservationCheck check_observation(const Observation& observation, const ObservedSteps& steps,
+                                   const kernels::GridSettings& grid, const RigidMotion& motion) {
+  ObservationCheck check;
+  check.size = observed_size(observation);
+  check.noise = observed_noise(observation);
+  check_start(observation, steps, grid, motion, check);
+  check_energy(observation, grid, motion, check);
+  return check;
+}
+
+std::optional<std::string> start_warning(const ObservationCheck& check) {
+  if (check.start_is_rigid()) return {};
+  std::string seen;
+  if (check.energy_gain > check.energy_allowed) {
+    seen = fmt::format(
+        "its centre of mass gains {:.2g} J/kg of {:.2g} J/kg after it, where noise explains {:.2g}",
+        check.energy_gain, check.kinetic, check.energy_allowed);
+  }
+  if (check.free_frames > 0 && check.start_residual > check.start_allowed) {
+    if (!seen.empty()) seen += "; ";
+    seen += fmt::format(
+        "away from the walls the best rigid motion leaves {:.2g} % of the size over the first {} "
+        "frames, where noise and rotation explain {:.2g} %",
+        100 * check.start_residual / check.size, check.free_frames,
+        100 * check.start_allowed / check.size);
+  }
+  return fmt::format(
+      "the first frame is taken as undeformed and its motion as rigid, and it is not: {}; expected "
+      "an observation that begins before the body is deformed",
+      seen);
+}
+
+}  // namespace uniphy
