@@ -1,5 +1,6 @@
 #include <cstdio>
 
+#include "uniphy/inference/fit_findings.hpp"
 #include "uniphy/inference/infer_run.hpp"
 #include "uniphy/report/experiment.hpp"
 
@@ -15,8 +16,8 @@ void run(const std::filesystem::path& file, const uniphy::FitVariablesSource& so
   hooks.fingerprint = fit_fingerprint(observation, *variables, out.config_yaml());
   const Inference result = infer(observation, file.string(), *variables, options, hooks);
 
-  write_latent(out.file("latent.h5"),
-               latent_of(result, *variables, source.model.string(), out.config_yaml()));
+  write_latent(out.file("latent.h5"), latent_of(result, observation, *variables,
+                                                source.model.string(), out.config_yaml()));
   write_trajectory(out.file("trajectory.h5"), result.fitted);
   plot_chart(out.file("loss.png"), loss_chart(result.fit, *variables, "Inference"));
   const Trajectory seen = observed_trajectory(observation);
@@ -29,9 +30,10 @@ void run(const std::filesystem::path& file, const uniphy::FitVariablesSource& so
   std::printf("fit_mse %.3e m^2, root/size %.3f %%, best start %.3e m^2, %zu roll-outs\n",
               result.fit_mse, 100 * *metrics.find("fit_root_over_size"), result.best_start,
               result.fit.history.size());
-  for (const NearestCode& near : variables->nearest(result.fit.u, 3)) {
-    std::printf("near start %d (%s), distance %.2f\n", near.code, near.material.c_str(),
-                near.distance);
+  std::fputs(fit_summary(result.fit, *variables).c_str(), stdout);
+  std::fflush(stdout);
+  for (const std::string& warning : fit_warnings(result, observation, *variables)) {
+    std::fprintf(stderr, "warning: %s: %s\n", file.c_str(), warning.c_str());
   }
 }
 

@@ -10,6 +10,7 @@
 #include <limits>
 
 #include "ops/kernels/base/error.hpp"
+#include "uniphy/inference/fit_findings.hpp"
 #include "uniphy/io/atomic_file.hpp"
 #include "uniphy/io/latent_file.hpp"
 #include "uniphy/io/observation.hpp"
@@ -72,14 +73,19 @@ CaseResult identify_one(const IdentifyOptions& options, std::int64_t material,
   std::fprintf(stderr, "%s\n", row.material.c_str());
   const Inference result = infer(observation, name, variables, options.fit, {});
   write_latent(folder / "latent.h5",
-               latent_of(result, variables, options.variables.model.string(), out.config_yaml()));
+               latent_of(result, observation, variables, options.variables.model.string(),
+                         out.config_yaml()));
   write_trajectory(folder / "fitted.h5", result.fitted);
   plot_chart(folder / "loss.png", loss_chart(result.fit, variables, row.material));
   row.fit_mse = result.fit_mse;
   row.fit_share = std::sqrt(result.fit_mse) / result.size;
   row.roll_outs = result.fit.history.size();
   row.roll_outs_to_a_hundredth = roll_outs_to_a_hundredth(result.fit).value_or(0);
-  row.nearest = variables.nearest(result.fit.u, 1).front().material;
+  row.nearest = result.fit.determined ? variables.nearest(result.fit.u, 1).front().material
+                                      : "not determined";
+  for (const std::string& warning : fit_warnings(result, observation, variables)) {
+    std::fprintf(stderr, "warning: %s: %s\n", name.c_str(), warning.c_str());
+  }
   row.other_best = std::numeric_limits<double>::infinity();
   for (int i = 0; i < variables.starts(); ++i) {
     if (variables.label(i) == row.material) continue;

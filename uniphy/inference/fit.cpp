@@ -273,6 +273,7 @@ class Fit {
     r.start = best.start;
     r.history = state_.history;
     r.contact = problem_.contact();
+    r.determined = r.contact < problem_.frames();
     for (int i = 0; i < variables_.starts(); ++i) {
       r.start_mse.push_back(start_mse(i, stages() - 1));
     }

@@ -62,7 +62,8 @@ struct FitResult {
   int start = 0;                  ///< the start that it comes from
   std::vector<double> start_mse;  ///< [starts] over all frames, infinite where the roll-out failed
   std::vector<FitRecord> history;
-  std::ptrdiff_t contact = 0;  ///< first frame at which a wall acts
+  std::ptrdiff_t contact = 0;  ///< first frame at which a wall acts, see first_contact
+  bool determined = true;      ///< false: no wall acted, and any law would have fitted
 };
 
 struct FitHooks {

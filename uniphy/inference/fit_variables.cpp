@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "models/trained_model.hpp"
 #include "ops/kernels/base/error.hpp"
@@ -21,7 +22,7 @@ torch::Tensor to_tensor(const std::vector<double>& numbers) {
 
 class LatentFitVariables : public FitVariables {
  public:
-  explicit LatentFitVariables(const ModelFile& file) {
+  explicit LatentFitVariables(const ModelFile& file) : training_dt_(file.training_dt) {
     if (file.codes() == 0) throw Error("model: expected latent codes to start from, found none");
     const models::TrainedModel model = models::trained_model(file, torch::kFloat64);
     law_ = model.law->frozen();
@@ -52,13 +53,15 @@ class LatentFitVariables : public FitVariables {
   int starts() const override { return static_cast<int>(starts_.size()); }
   std::vector<double> start(int i) const override { return starts_[i]; }
   std::string label(int i) const override { return materials_[i]; }
+  std::array<double, 2> training_dt() const override { return training_dt_; }
 
  private:
   torch::Tensor code(const torch::Tensor& u) const { return mean_ + spread_ * u; }
 
   models::LearnedLaw law_{nullptr};  // frozen
   std::vector<std::string> materials_;
-  torch::Tensor mean_, spread_;  // [latent size]
+  std::array<double, 2> training_dt_;  // s
+  torch::Tensor mean_, spread_;        // [latent size]
   std::vector<std::vector<double>> starts_;
 };
 
@@ -66,18 +69,32 @@ class AnalyticFitVariables : public FitVariables {
  public:
   AnalyticFitVariables(kernels::LawId id, const std::vector<std::array<double, 2>>& ranges,
                        int starts, std::uint64_t seed)
-      : id_(id), size_(static_cast<int>(kernels::law_parameters(id).size())) {
-    if (static_cast<int>(ranges.size()) != size_) {
+      : id_(id), ranges_(ranges) {
+    const std::size_t count = kernels::law_parameters(id).size();
+    if (ranges.size() != count) {
       throw Error(std::string("law ") + kernels::law_name(id) + ": expected " +
-                  std::to_string(size_) + " ranges, found " + std::to_string(ranges.size()));
+                  std::to_string(count) + " ranges, found " + std::to_string(ranges.size()));
     }
     std::vector<double> middle, half;
-    for (const auto& range : ranges) {
-      middle.push_back(0.5 * (std::log(range[0]) + std::log(range[1])));
-      half.push_back(std::max(0.5 * (std::log(range[1]) - std::log(range[0])), 1e-3));
+    std::vector<std::int64_t> fitted;
+    for (std::size_t k = 0; k < count; ++k) {
+      const auto& [low, high] = ranges[k];
+      middle.push_back(0.5 * (std::log(low) + std::log(high)));
+      if (low == high) {
+        fixed_.emplace_back(k, low);
+        half.push_back(0);
+        continue;
+      }
+      fitted.push_back(static_cast<std::int64_t>(k));
+      half.push_back(std::max(0.5 * (std::log(high) - std::log(low)), 1e-3));
+    }
+    size_ = static_cast<int>(fitted.size());
+    if (size_ == 0) {
+      throw Error(std::string("law ") + kernels::law_name(id) +
+                  ": expected a parameter with a range of more than one value, found constants");
     }
     middle_ = to_tensor(middle);
-    half_ = to_tensor(half);
+    widths_ = torch::diag(to_tensor(half)).index_select(1, torch::tensor(fitted)).contiguous();
     UniformRandom random(seed);
     for (int i = 0; i < starts; ++i) {
       std::vector<double> u;
@@ -91,7 +108,12 @@ class AnalyticFitVariables : public FitVariables {
   ops::RolloutBody body(const torch::Tensor& u, std::ptrdiff_t particles) const override {
     kernels::LawDescription law;
     law.id = id_;
-    return {0, particles, law, (middle_ + half_ * u).exp()};
+    torch::Tensor parameters = (middle_ + widths_.mv(u)).exp();
+    // The value itself: the exponential of a logarithm differs from it in the last bits.
+    for (const auto& [k, value] : fixed_) {
+      parameters = parameters.index_fill(0, torch::tensor({static_cast<std::int64_t>(k)}), value);
+    }
+    return {0, particles, law, parameters};
   }
 
   torch::Tensor prior(const torch::Tensor&) const override { return {}; }
@@ -99,11 +121,15 @@ class AnalyticFitVariables : public FitVariables {
   int starts() const override { return static_cast<int>(starts_.size()); }
   std::vector<double> start(int i) const override { return starts_[i]; }
   std::string label(int) const override { return kernels::law_name(id_); }
+  std::vector<std::array<double, 2>> ranges() const override { return ranges_; }
 
  private:
   kernels::LawId id_;
-  int size_;
-  torch::Tensor middle_, half_;  // [size]
+  std::vector<std::array<double, 2>> ranges_;
+  int size_ = 0;                                       ///< of the parameters that are no constants
+  std::vector<std::pair<std::size_t, double>> fixed_;  ///< constants and their places
+  torch::Tensor middle_;                               ///< [parameters]
+  torch::Tensor widths_;  ///< [parameters, size]: half widths, a column each
   std::vector<std::vector<double>> starts_;
 };
 

@@ -31,6 +31,12 @@ class FitVariables {
   virtual std::vector<double> start(int i) const = 0;
   virtual std::string label(int i) const = 0;
 
+  /// [low, high] of each parameter of an analytic law, in the order of law_parameters(id), which
+  /// starts are drawn from; empty for a learned one.
+  virtual std::vector<std::array<double, 2>> ranges() const { return {}; }
+  /// Of the model: ModelFile::training_dt; 0 for analytic laws, which know the time step.
+  virtual std::array<double, 2> training_dt() const { return {}; }
+
   /// The law of u for the kernels and for files.
   kernels::LawDescription law(const torch::Tensor& u) const;
   kernels::LawDescription law(const std::vector<double>& u) const;
@@ -43,7 +49,9 @@ class FitVariables {
 std::unique_ptr<const FitVariables> make_latent_variables(const ModelFile& model);
 
 /// The parameters of an analytic law: u = (log p − middle)/half width over `ranges` of the
-/// logarithm, one [low, high] for each of law_parameters(id). Starts are drawn from them.
+/// logarithm, one [low, high] for each of law_parameters(id). Starts are drawn from them; a fit may
+/// leave them. A parameter with low = high is a constant and has no place in u. Throws Error where
+/// all are constants.
 std::unique_ptr<const FitVariables> make_analytic_variables(
     kernels::LawId id, const std::vector<std::array<double, 2>>& ranges, int starts,
     std::uint64_t seed);

@@ -8,6 +8,14 @@
 #include "uniphy/scene/law_config.hpp"
 
 namespace uniphy {
+namespace {
+
+constexpr const char* kRangeText =
+    "starts are drawn from here; no bound: a fit may end outside, which is marked. A range of one "
+    "value is a constant";
+
+}  // namespace
+
 FitOptions read_fit_options(Section& config) {
   FitOptions options;
   options.dtype = config.choice("dtype", std::string("float32"), {"float32", "float64"},
@@ -98,8 +106,13 @@ FitVariablesSource read_fit_variables(Section& config) {
              const kernels::LawParameter& p = kernels::law_parameters(id)[k];
              Range range = range_of(p);
              range.low_open = true;  // they are fitted as logarithms
-             source.ranges.push_back(
-                 s.interval(p.name, defaults[k], range, p.unit, "starts are drawn from here"));
+             source.ranges.push_back(s.interval(p.name, defaults[k], range, p.unit, kRangeText));
+           }
+           const auto constant = [](const std::array<double, 2>& r) { return r[0] == r[1]; };
+           if (std::all_of(source.ranges.begin(), source.ranges.end(), constant)) {
+             s.fail(kernels::law_parameters(id)[0].name,
+                    "expected a parameter with a range of more than one value, found constants, "
+                    "which leave nothing to fit");
            }
            source.starts = static_cast<int>(
                s.integer("starts", 100, between(1, 100000), "", "points that are tried first"));

@@ -8,6 +8,7 @@
 #include <map>
 
 #include "ops/kernels/base/hash.hpp"
+#include "uniphy/inference/fit_findings.hpp"
 #include "uniphy/inference/observed_motion.hpp"
 #include "uniphy/scene/comparison.hpp"
 
@@ -50,8 +51,10 @@ Inference infer(const Observation& observation, const std::string& name,
   result.fitted = seen;
   result.fitted.x.clear();
   const ObservedSteps steps = observed_steps(observation, name);
-  const auto objective =
-      make_motion_objective(observation, steps, observed_grid(observation, name), options.dtype);
+  const kernels::GridSettings grid = observed_grid(observation, name);
+  result.check = check_observation(
+      observation, steps, grid, observed_motion(observation, steps, grid, options.velocity_frames));
+  const auto objective = make_motion_objective(observation, steps, grid, options.dtype);
   objective->simulate(result.fit.law, result.fit.motion,
                       [&](std::ptrdiff_t, const std::vector<double>& x) {
                         result.fitted.x.insert(result.fitted.x.end(), x.begin(), x.end());
@@ -62,16 +65,19 @@ Inference infer(const Observation& observation, const std::string& name,
   return result;
 }
 
-LatentFile latent_of(const Inference& inference, const FitVariables& variables,
-                     const std::string& model, const std::string& config) {
+LatentFile latent_of(const Inference& inference, const Observation& observation,
+                     const FitVariables& variables, const std::string& model,
+                     const std::string& config) {
   const FitResult& fit = inference.fit;
   LatentFile file;
   file.law = kernels::law_name(fit.law.id);
   file.config = config;
+  file.dt = observation.dt;
+  file.determined = inference.fit.determined;
   if (fit.law.id == kernels::LawId::learned) {
     file.model = model;
     file.z = fit.law.z;
-    file.nearest = variables.nearest(fit.u, 5);
+    if (fit.determined) file.nearest = variables.nearest(fit.u, 5);
   } else {
     file.analytic = fit.law;
   }
@@ -107,7 +113,15 @@ void add_metrics(Metrics& metrics, const Inference& inference, const Observation
   metrics.set("starts_failed",
               static_cast<double>(std::count_if(fit.start_mse.begin(), fit.start_mse.end(),
                                                 [](double mse) { return !std::isfinite(mse); })));
-  if (fit.contact < observation.frames) {
+  const ObservationCheck& check = inference.check;
+  metrics.set("noise_over_size", check.noise / check.size);
+  metrics.set("start_frames", static_cast<double>(check.free_frames));
+  metrics.set("start_residual_over_size", check.start_residual / check.size);
+  metrics.set("start_allowed_over_size", check.start_allowed / check.size);
+  metrics.set("energy_gain_over_kinetic",
+              check.kinetic > 0 ? check.energy_gain / check.kinetic : 0);
+  metrics.set("contact", fit.determined ? 1 : 0);
+  if (fit.determined) {
     metrics.set("contact_s", observation.time[fit.contact] - observation.time[0]);
   }
   const char* axes[] = {"x", "y", "z"};
@@ -115,9 +129,12 @@ void add_metrics(Metrics& metrics, const Inference& inference, const Observation
     metrics.set(fmt::format("velocity.{}", axes[k]), fit.motion.linear[k]);
     metrics.set(fmt::format("angular_velocity.{}", axes[k]), fit.motion.angular[k]);
   }
+  if (!fit.determined) return;
   metrics.set("nearest.distance", variables.nearest(fit.u, 1).front().distance);
-  for (const kernels::LawParameter& p : kernels::law_parameters(fit.law.id))
-    metrics.set(std::string("parameter.") + p.name, fit.law.*p.member);
+  for (const FittedParameter& p : fitted_parameters(fit.law, variables)) {
+    metrics.set("parameter." + p.name, p.value);
+    metrics.set("outside_range." + p.name, p.outside() ? 1 : 0);
+  }
 }
 
 Chart loss_chart(const FitResult& fit, const FitVariables& variables, const std::string& title) {
@@ -148,7 +165,8 @@ Chart loss_chart(const FitResult& fit, const FitVariables& variables, const std:
     if (line.stage != r.stage) line.best = std::numeric_limits<double>::infinity();
     line.stage = r.stage;
     line.best = std::min(line.best, r.mse);
-    line.series.label = fmt::format("start {} ({})", r.candidate, variables.label(r.candidate));
+    line.series.label = fmt::format("start {}", r.candidate);
+    if (fit.determined) line.series.label += fmt::format(" ({})", variables.label(r.candidate));
     line.series.x.push_back(offset[r.stage] + r.epoch + 1);
     line.series.y.push_back(line.best);
   }

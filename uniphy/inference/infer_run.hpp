@@ -7,6 +7,7 @@
 
 #include "uniphy/inference/fit.hpp"
 #include "uniphy/inference/infer_options.hpp"
+#include "uniphy/inference/observation_check.hpp"
 #include "uniphy/io/trajectory.hpp"
 #include "uniphy/report/metrics.hpp"
 #include "uniphy/report/plot.hpp"
@@ -16,19 +17,22 @@ namespace uniphy {
 /// A finished inference and the roll-out of its result.
 struct Inference {
   FitResult fit;
-  Trajectory fitted;      ///< at the observed frames
-  double fit_mse = 0;     ///< m², of `fitted` against the observation
-  double size = 0;        ///< m, largest side of the observed body
-  double best_start = 0;  ///< m², what the best start reaches over all frames
+  Trajectory fitted;       ///< at the observed frames
+  double fit_mse = 0;      ///< m², of `fitted` against the observation
+  double size = 0;         ///< m, largest side of the observed body
+  double best_start = 0;   ///< m², what the best start reaches over all frames
+  ObservationCheck check;  ///< whether the observation is what the fit takes it for
 };
 
 /// Fits and rolls out once more. Throws Error.
 Inference infer(const Observation& observation, const std::string& name,
                 const FitVariables& variables, const FitOptions& options, const FitHooks& hooks);
 
-/// The product of uniphy_infer. `model` is the path that resimulate will look for.
-LatentFile latent_of(const Inference& inference, const FitVariables& variables,
-                     const std::string& model, const std::string& config);
+/// The product of uniphy_infer. `model` is the path that resimulate will look for. Names no
+/// nearest codes where the material is not determined.
+LatentFile latent_of(const Inference& inference, const Observation& observation,
+                     const FitVariables& variables, const std::string& model,
+                     const std::string& config);
 
 /// Roll-outs with gradients, of all candidates, until the mse over all frames was a hundredth of
 /// the best start's: what optimizers are compared by. Nothing where that was never reached.
@@ -36,8 +40,12 @@ std::optional<std::size_t> roll_outs_to_a_hundredth(const FitResult& fit);
 
 /// fit_mse (m²), fit_root_over_size, size, best_start_mse, roll_outs, roll_outs_to_a_hundredth
 /// (where it was reached), starts, starts_failed,
-/// contact_s, velocity.{x,y,z}, angular_velocity.{x,y,z}, nearest.distance and, of an analytic law,
-/// parameter.NAME.
+/// contact (1, or 0 where no wall acted before the last frame), contact_s,
+/// start_residual_over_size, start_allowed_over_size, start_frames, noise_over_size,
+/// energy_gain_over_kinetic (ObservationCheck; 0 of a body that does not move),
+/// velocity.{x,y,z}, angular_velocity.{x,y,z} and, where the material is determined,
+/// nearest.distance and, of an analytic law, parameter.NAME and outside_range.NAME (1 where it
+/// ended outside of its range).
 void add_metrics(Metrics& metrics, const Inference& inference, const Observation& observation,
                  const FitVariables& variables);
 

@@ -195,6 +195,8 @@ TEST(LatentFileTest, ReadsBack) {
   latent.history = {{0, 4, 2, 0.1, 1e-5}, {1, 4, 0, 0.2, std::numeric_limits<double>::infinity()}};
   latent.nearest = {{4, 0.5, "sand"}};
   latent.config = "a: 1\n";
+  latent.dt = 4e-4;
+  latent.determined = false;
   const testing::Scratch scratch;
   write_latent(scratch.file("l.h5"), latent);
   const LatentFile read = read_latent(scratch.file("l.h5"));
@@ -204,6 +206,8 @@ TEST(LatentFileTest, ReadsBack) {
   EXPECT_EQ(read.linear, latent.linear);
   EXPECT_EQ(read.centre, latent.centre);
   EXPECT_EQ(read.config, latent.config);
+  EXPECT_EQ(read.dt, latent.dt);
+  EXPECT_FALSE(read.determined);
   ASSERT_EQ(read.history.size(), 2u);
   EXPECT_EQ(read.history[0].epoch, 2);
   EXPECT_TRUE(std::isinf(read.history[1].mse));
@@ -221,6 +225,8 @@ TEST(LatentFileTest, ReadsBack) {
   EXPECT_EQ(back.analytic.id, kernels::LawId::sand);
   EXPECT_EQ(back.analytic.theta, 0.3);
   EXPECT_EQ(back.analytic.eta, 0);
+  EXPECT_EQ(back.dt, 0);  // not known
+  EXPECT_TRUE(back.determined);
 }
 
 TEST(LatentFileTest, WhatIsMissingIsNamed) {
