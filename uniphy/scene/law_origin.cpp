@@ -12,7 +12,7 @@ bool flows_by_steps(const kernels::LawDescription& law) {
   const auto kernel = kernels::make_law<double>(law);
   constexpr double kDt = 1e-4;  // s; no learned law sees it
   constexpr double kRest[9] = {};
-  for (const double strain : {0.003, 0.01, 0.03, 0.1, 0.3, 0.5}) {
+  for (const double strain : {0.003, 0.01, 0.03, 0.1, 0.2}) {
     for (const double sign : {-1.0, 1.0}) {
       // Stretched along x at constant volume.
       const double along = std::exp(sign * strain), across = std::exp(-0.5 * sign * strain);

@@ -23,7 +23,8 @@ struct LawOrigin {
 /// True where the law takes a strain back by a share in each step, so that its rate of flow goes
 /// with the time step that its data had. Only learned laws can: analytic ones know the step. Found
 /// by projecting strained states twice: a return at a rate goes on in the second projection, one to
-/// a yield surface has arrived.
+/// a yield surface has arrived. Strains up to 0.2 are looked at; at 0.3 caps that training put out
+/// of the reach of its elastic samples begin to count.
 bool flows_by_steps(const kernels::LawDescription& law);
 
 /// The factor by which dt (s) is off `range`, ≥ 1; 1 inside of it, or where it is not known.

@@ -8,6 +8,9 @@
 #include "tests/uniphy/evaluation/small_run.hpp"
 #include "uniphy/evaluation/ablation_report.hpp"
 #include "uniphy/evaluation/ablation_stage.hpp"
+#include "uniphy/io/dataset.hpp"
+#include "uniphy/io/model_file.hpp"
+#include "uniphy/training/train_stage.hpp"
 
 namespace uniphy {
 namespace {
@@ -50,6 +53,22 @@ TEST(Ablation, KeepsFinishedVariants) {
   EXPECT_EQ(again.find("base.train_s"), first.find("base.train_s"));
   EXPECT_EQ(again.find("published.stress_error"), first.find("published.stress_error"));
   EXPECT_EQ(again.find("published.rollouts_failed"), first.find("published.rollouts_failed"));
+}
+
+TEST(Ablation, TrainedModelsKnowTheTimeStepsOfTheirData) {
+  const testing::Scratch scratch;
+  testing::run_stage(ablation_stage, config("{type: steps, steps: 2}", "  - {name: a}\n"),
+                     scratch.file("out"));
+  const std::filesystem::path data = scratch.file("out/data/train_2.h5");
+  const std::array<double, 2> dt = time_steps(read_dataset(data));
+  EXPECT_GT(dt[0], 0);
+  EXPECT_EQ(read_model(scratch.file("out/a/model.h5")).training_dt, dt);
+  testing::run_stage(train_stage,
+                     "data: " + data.string() +
+                         "\nmodel: {width: 8, hidden_layers: 1, latent_size: 4}\n"
+                         "training: {steps: 2}\n",
+                     scratch.file("trained"));
+  EXPECT_EQ(read_model(scratch.file("trained/model.h5")).training_dt, dt);
 }
 
 TEST(Ablation, OtherSettingsAreNotMixed) {

@@ -256,6 +256,12 @@ TEST(LatentFileTest, WhatIsMissingIsNamed) {
                         {"Pa", ""});
       },
       "expected lambda >= 0");
+  refused(
+      [](hdf5::Writer& w) {
+        w.attribute("/", "law", "elastic");
+        w.attribute("/", "dt", -1e-4);
+      },
+      "l.h5: attribute dt of /: expected a time step");
 }
 
 struct BadConfig {

@@ -66,6 +66,14 @@ TEST(Dataset, ReadsBackWhatWasAppendedTrajectoryByTrajectory) {
   }
 }
 
+TEST(Dataset, TimeStepsAreTheShortestAndTheLongest) {
+  Dataset dataset;
+  EXPECT_EQ(time_steps(dataset), (std::array<double, 2>{0, 0}));
+  dataset.trajectories.assign(3, record_of("sand"));
+  dataset.trajectories[1].dt = 1e-4;
+  EXPECT_EQ(time_steps(dataset), (std::array<double, 2>{1e-4, 1.0 / 4800}));
+}
+
 TEST(DatasetWriter, RefusesUnevenSamplesAndKeepsNothingWithoutFinish) {
   const testing::Scratch scratch;
   {

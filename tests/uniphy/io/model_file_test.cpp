@@ -164,6 +164,7 @@ struct Layout {
   double weight = 0.5;
   std::string layer_name = "layer_0";
   std::int64_t latent_rows = 1;
+  std::vector<double> training_dt{1e-4, 2e-4};
 };
 
 std::string message_of(const std::function<void(Layout&)>& spoil) {
@@ -181,6 +182,7 @@ std::string message_of(const std::function<void(Layout&)>& spoil) {
   w.attribute("/", "rate_units", l.rate_units);
   w.attribute("/", "latent_size", l.latent_size);
   w.attribute("/", "config", "");
+  w.attribute("/", "training_dt", l.training_dt);
   w.write("projection/layer_0/weight",
           std::vector<double>(kShape.projection_out * (kShape.projection_in + 2), 0.5),
           {kShape.projection_out, kShape.projection_in + 2}, info);
@@ -228,6 +230,12 @@ TEST(ModelFile, MalformedFilesAreRefused) {
             "m.h5: /stress/layer_0/weight: expected finite numbers, found nan at position 0");
   EXPECT_EQ(message_of([](Layout& l) { l.layer_name = "layer_1"; }),
             "m.h5: /stress/layer_0/weight: expected a dataset, found nothing of that name");
+  for (const std::vector<double>& dt :
+       {std::vector<double>{2e-4, 1e-4}, {0, 1e-4}, {1e-4, INFINITY}})
+    EXPECT_THAT(message_of([&](Layout& l) { l.training_dt = dt; }),
+                ::testing::HasSubstr("m.h5: attribute training_dt"));
+  EXPECT_THAT(message_of([](Layout& l) { l.training_dt = {1e-4}; }),
+              ::testing::HasSubstr("training_dt"));
   EXPECT_EQ(message_of([](Layout& l) { l.latent_rows = 3; }),
             "m.h5: /latents/z: expected the shape [1, 2], found [3, 2]");
 }
