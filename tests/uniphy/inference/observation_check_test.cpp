@@ -82,6 +82,7 @@ TEST(ObservationCheck, NoRigidStartIsDoubted) {
       for (const double centre : {0.34, 0.36, 0.5}) {  // on the wall, above it, far from it
         testing::ObservedScene scene;
         scene.motion = {{0.5, centre, 0.5}, {0.4, -1.5, -0.3}, turning};
+        scene.frames = 21;
         const Observation o = testing::observe(law, scene);
         SCOPED_TRACE(::testing::Message() << kernels::law_name(law.id) << " mu " << law.mu << " at "
                                           << centre << " turning " << turning.transpose());
