@@ -5,11 +5,10 @@
 #include <Eigen/Geometry>
 #include <Eigen/SVD>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <vector>
 
-#include "ops/kernels/base/statistics.hpp"
+#include "uniphy/inference/observed_noise.hpp"
 
 namespace uniphy {
 namespace {
@@ -73,33 +72,6 @@ double square_of_turning(const Observation& o, const RigidMotion& motion) {
   return sum / total;
 }
 
-/// Noise of the path c [frames, points, 3].
-double noise_of(const std::vector<double>& time, const double* c, std::int64_t points) {
-  constexpr std::int64_t kEnough = 1000000;  // numbers that a median is taken of
-  const std::int64_t stride =
-      std::max<std::int64_t>(1, static_cast<std::int64_t>(time.size()) * 3 * points / kEnough);
-  std::vector<double> seen;
-  for (std::size_t f = 0; f + 3 < time.size(); ++f) {
-    std::array<double, 4> weight;
-    double square = 0;
-    for (int i = 0; i < 4; ++i) {
-      double product = 1;
-      for (int j = 0; j < 4; ++j) {
-        if (j != i) product *= (time[f + i] - time[f + j]) / (time[f + 3] - time[f]);
-      }
-      weight[i] = 1 / product;
-      square += weight[i] * weight[i];
-    }
-    for (std::int64_t k = 0; k < 3 * points; k += stride) {
-      double difference = 0;
-      for (int i = 0; i < 4; ++i) difference += weight[i] * c[(f + i) * 3 * points + k];
-      seen.push_back(std::abs(difference) / std::sqrt(square));
-    }
-  }
-  constexpr double kMedianOfNormal = 0.6745;  // of |x| for a standard deviation of 1
-  return seen.empty() ? 0 : kernels::median(seen) / kMedianOfNormal;
-}
-
 void check_start(const Observation& o, const ObservedSteps& steps,
                  const kernels::GridSettings& grid, const RigidMotion& motion,
                  ObservationCheck& check) {
@@ -139,7 +111,7 @@ void check_energy(const Observation& o, const kernels::GridSettings& grid,
     const Vector3d c = centre_of_mass(o, f) - motion.centre;
     path.insert(path.end(), c.data(), c.data() + 3);
   }
-  const double noise = std::min(noise_of(o.time, path.data(), 1), check.noise);
+  const double noise = std::min(path_noise(o.time, path.data(), 1), check.noise);
   const Map<const Vector3d> gravity(grid.gravity);
   const double first = 0.5 * (motion.linear.squaredNorm() + square_of_turning(o, motion));
   double shortest = o.time[1] - o.time[0];
@@ -160,10 +132,6 @@ void check_energy(const Observation& o, const kernels::GridSettings& grid,
 }
 
 }  // namespace
-
-double observed_noise(const Observation& observation) {
-  return noise_of(observation.time, observation.x.data(), observation.particles);
-}
 
 ObservationCheck check_observation(const Observation& observation, const ObservedSteps& steps,
                                    const kernels::GridSettings& grid, const RigidMotion& motion) {

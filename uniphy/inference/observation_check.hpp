@@ -41,11 +41,6 @@ ObservationCheck check_observation(const Observation& observation, const Observe
 /// Where start_is_rigid() does not hold, a sentence that says by how much.
 std::optional<std::string> start_warning(const ObservationCheck& check);
 
-/// Standard deviation of the noise of a coordinate, m: the median of third divided differences of a
-/// particle's path in time, which a smooth motion has next to none of. 0 with less than four
-/// frames.
-double observed_noise(const Observation& observation);
-
 /// Frames that start_residual looks at: enough for a wave to cross a part of a soft body (a cube of
 /// 0.2 m and 5 kPa rings at 10 Hz; eight frames of 1/400 s are a fifth of that).
 inline constexpr std::ptrdiff_t kStartFrames = 8;

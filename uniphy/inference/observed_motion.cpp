@@ -10,6 +10,7 @@
 
 #include "ops/kernels/base/error.hpp"
 #include "ops/kernels/rollout/rollout.hpp"
+#include "uniphy/inference/observed_noise.hpp"
 #include "uniphy/scene/grid_memory.hpp"
 
 namespace uniphy {
@@ -42,8 +43,8 @@ std::vector<double> fly(const kernels::Rollout<double>& rollout, const Observati
 }
 
 /// True where one free flight, its start fitted to all frames, explains the path of the centre of
-/// mass: to 1 % of a cell, or, up to 10 %, but for what jumps from frame to frame as noise does and
-/// no motion.
+/// mass: to 1 % of a cell, or, up to 10 %, but for what is no more than the noise of the particles
+/// and jumps from frame to frame as noise does and no motion.
 bool flies_freely(const Observation& observation, const ObservedSteps& steps,
                   const kernels::GridSettings& grid) {
   const auto frames = static_cast<Eigen::Index>(observation.frames);
@@ -61,7 +62,8 @@ bool flies_freely(const Observation& observation, const ObservedSteps& steps,
   // J. von Neumann, Ann. Math. Stat. 12 (1941): 2 for white noise, 0 for a smooth path.
   const double jumps =
       (path.bottomRows(frames - 1) - path.topRows(frames - 1)).squaredNorm() / path.squaredNorm();
-  return largest <= 10 * kContactCells * grid.dx() && jumps > 1;
+  return jumps > 1 && largest <= 10 * kContactCells * grid.dx() &&
+         largest <= 5 * observed_noise(observation);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "tests/uniphy/inference/observed_scene.hpp"
+#include "uniphy/inference/observed_noise.hpp"
 
 namespace uniphy {
 namespace {
@@ -174,6 +175,24 @@ TEST(ObservationCheck, ContactIsSeenThroughNoiseAndFreeFlightIsNoContact) {
     EXPECT_FALSE(contact(with_noise(flies, 0.005, seed)));
     EXPECT_FALSE(contact(with_noise(flies, 0.02, seed)));
   }
+}
+
+TEST(ObservationCheck, AContactOfTheLastFrameAloneIsOne) {
+  const testing::ObservedScene scene;
+  Observation o = testing::observe(testing::elastic_body(), scene);
+  const kernels::GridSettings grid = observed_grid(o, "o");
+  const auto contact_of = [&](const Observation& seen) {
+    const ObservedSteps steps = observed_steps(seen, "o");
+    return first_contact(seen, steps, grid, observed_motion(seen, steps, grid, 1));
+  };
+  const std::ptrdiff_t contact = contact_of(o);
+  o.frames = contact + 1;
+  o.time.resize(o.frames);
+  o.x.resize(o.frames * 3 * o.particles);
+  for (std::int64_t p = 0; p < o.particles; ++p) {
+    o.x[3 * (contact * o.particles + p) + 1] += 0.05 * grid.dx();  // more than a fit can hide
+  }
+  EXPECT_EQ(contact_of(o), contact);
 }
 
 }  // namespace
