@@ -49,8 +49,9 @@ void add_codes(torch::jit::Module& module, const ScriptCodes& codes, int latent_
   const auto rows = static_cast<std::int64_t>(count);
   module.register_buffer(
       "codes", torch::tensor(codes.z, torch::kFloat64).reshape({rows, latent_size}).to(dtype));
-  module.register_buffer("material_parameters",
-                         torch::tensor(parameters, torch::kFloat64).reshape({rows, 5}));
+  module.register_buffer(
+      "material_parameters",
+      torch::tensor(parameters, torch::kFloat64).reshape({rows, kernels::kFamilyParameters}));
   const auto list = c10::ListType::create(c10::StringType::get());
   module.register_attribute("materials", list, names(codes.materials));
   module.register_attribute("parameter_names", list,

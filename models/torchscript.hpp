@@ -52,21 +52,24 @@ inline constexpr const char* kScriptUnits = "F: 1, C: 1/s, z: 1, tau: Pa";
 
 /// The columns of material_parameters; a newtonian law's mu is in Pa s.
 inline constexpr auto kScriptParameterNames = [] {
-  std::array<const char*, kernels::kLawParameters> names{};
-  for (const auto& p : kernels::kLawParameterTable) names[p.place] = p.name;
+  std::array<const char*, kernels::kFamilyParameters> names{};
+  for (int i = 0; i < kernels::kFamilyParameters; ++i)
+    names[i] = kernels::kLawParameterTable[i].name;
   return names;
 }();
 inline constexpr auto kScriptParameterUnits = [] {
-  std::array<const char*, kernels::kLawParameters> units{};
-  for (const auto& p : kernels::kLawParameterTable) units[p.place] = p.unit;
+  std::array<const char*, kernels::kFamilyParameters> units{};
+  for (int i = 0; i < kernels::kFamilyParameters; ++i)
+    units[i] = kernels::kLawParameterTable[i].unit;
   return units;
 }();
 
 /// The training codes that a file carries; none by default.
 struct ScriptCodes {
-  std::vector<double> z;                          ///< [N, latent_size]
-  std::vector<std::string> materials;             ///< [N]
-  std::vector<std::array<double, 5>> parameters;  ///< [N], NaN where the law has none
+  std::vector<double> z;               ///< [N, latent_size]
+  std::vector<std::string> materials;  ///< [N]
+  std::vector<std::array<double, kernels::kFamilyParameters>>
+      parameters;  ///< [N], NaN where the law has none
 };
 
 /// The module of a law; dtype is float32 or float64. Throws Error where the weights or the codes do

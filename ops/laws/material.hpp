@@ -28,15 +28,22 @@ class Parameter {
 /// One material for all particles of a call. A law looks only at the parameters that it has
 /// (kernels::law_parameters); the gradient of the others is zero.
 struct Material {
-  Parameter mu;      ///< Pa (Pa s for newtonian)
-  Parameter lambda;  ///< Pa
-  Parameter tau_y;   ///< Pa
-  Parameter theta;   ///< rad
-  Parameter eta;     ///< Pa s
+  Parameter mu;        ///< Pa (Pa s for newtonian)
+  Parameter lambda;    ///< Pa
+  Parameter tau_y;     ///< Pa
+  Parameter theta;     ///< rad
+  Parameter eta;       ///< Pa s
+  Parameter c1, c2;    ///< Pa
+  Parameter eta_inf;   ///< Pa s
+  Parameter kappa;     ///< s
+  Parameter n;         ///< flow index
+  Parameter cohesion;  ///< strain
 };
 /// Its members in the order of kernels::kLawParameterTable.
 inline constexpr Parameter Material::*kMaterialMembers[kernels::kLawParameters] = {
-    &Material::mu, &Material::lambda, &Material::tau_y, &Material::theta, &Material::eta};
+    &Material::mu,    &Material::lambda, &Material::tau_y,   &Material::theta,
+    &Material::eta,   &Material::c1,     &Material::c2,      &Material::eta_inf,
+    &Material::kappa, &Material::n,      &Material::cohesion};
 
 /// The material of an analytic law: its numbers; or those of `parameters` [N], in the order of
 /// kernels::law_parameters(law), which gradients reach. `op` opens the message of the Error where

@@ -23,7 +23,8 @@ class Errors(unittest.TestCase):
              "svd3: F: expected [P, 3, 3] Float or Double on cpu, found [3, 3] Double on cpu"),
             (lambda: ops.return_mapping("clay", F, elastic, 1e-3),
              'return_mapping: law: expected one of elastic, newtonian, plasticine, sand, '
-             'non_newtonian, fixed_corotated, water, volume_corrected_sand, learned; found "clay"'),
+             'non_newtonian, fixed_corotated, water, volume_corrected_sand, mooney_rivlin, carreau, '
+             'cohesive_sand, herschel_bulkley, learned; found "clay"'),
             (lambda: ops.return_mapping("volume_corrected_sand", F, z[:3] + 0.1, 1e-3),
              "return_mapping: law: expected one without memory, found volume_corrected_sand "
              "(return_mapping_with_memory takes it)"),

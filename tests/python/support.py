@@ -40,6 +40,10 @@ ANALYTIC_LAWS = {  # parameters in the order of the library, Pa, rad, Pa s
     "non_newtonian": [4e3, 6e3, 300.0, 5.0],
     "fixed_corotated": [4e3, 6e3],
     "water": [6e3],
+    "mooney_rivlin": [6e3, 3e3, 1e3],
+    "carreau": [6e3, 30.0, 5.0, 0.3, 0.5],
+    "cohesive_sand": [4e3, 6e3, 0.3, 0.01],
+    "herschel_bulkley": [4e3, 6e3, 300.0, 5.0, 0.7],
 }
 
 

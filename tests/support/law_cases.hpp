@@ -61,7 +61,13 @@ inline kernels::LawDescription sample_law(kernels::LawId id) {
   d.lambda = 2e5;
   d.tau_y = 7e3;
   d.theta = 0.35;
-  d.eta = 5;
+  d.eta = id == kernels::LawId::carreau ? 200 : 5;
+  d.c1 = 8e4;
+  d.c2 = 2e4;
+  d.eta_inf = 20;
+  d.kappa = 0.4;
+  d.n = id == kernels::LawId::carreau ? 0.4 : 0.7;
+  d.cohesion = 0.02;
   return d;
 }
 
@@ -70,7 +76,9 @@ inline const std::vector<kernels::LawId>& analytic_laws() {
   static const std::vector<LawId> all{LawId::elastic,       LawId::newtonian,
                                       LawId::plasticine,    LawId::sand,
                                       LawId::non_newtonian, LawId::fixed_corotated,
-                                      LawId::water,         LawId::volume_corrected_sand};
+                                      LawId::water,         LawId::volume_corrected_sand,
+                                      LawId::mooney_rivlin, LawId::carreau,
+                                      LawId::cohesive_sand, LawId::herschel_bulkley};
   return all;
 }
 inline std::vector<kernels::LawId> laws_without_memory() {
@@ -79,15 +87,24 @@ inline std::vector<kernels::LawId> laws_without_memory() {
   return all;
 }
 
+/// Whether the stress depends on C.
+inline bool is_viscous_fluid(kernels::LawId id) {
+  return id == kernels::LawId::newtonian || id == kernels::LawId::carreau;
+}
 inline bool is_fluid(kernels::LawId id) {
-  return id == kernels::LawId::newtonian || id == kernels::LawId::water;
+  return is_viscous_fluid(id) || id == kernels::LawId::water;
 }
 inline bool is_sand(kernels::LawId id) {
-  return id == kernels::LawId::sand || id == kernels::LawId::volume_corrected_sand;
+  using kernels::LawId;
+  return id == LawId::sand || id == LawId::volume_corrected_sand || id == LawId::cohesive_sand;
+}
+/// Whether the flow depends on the time step.
+inline bool is_rate_dependent(kernels::LawId id) {
+  return id == kernels::LawId::non_newtonian || id == kernels::LawId::herschel_bulkley;
 }
 inline bool is_plastic(kernels::LawId id) {
   using kernels::LawId;
-  return id == LawId::plasticine || is_sand(id) || id == LawId::non_newtonian;
+  return id == LawId::plasticine || is_sand(id) || is_rate_dependent(id);
 }
 
 /// F with deviatoric strain of norm q and trace t, in a random frame.
@@ -104,14 +121,15 @@ inline Matrix strained(double q, double t, std::mt19937_64& random) {
 inline double yield_norm(const kernels::LawDescription& d, double t) {
   if (!is_sand(d.id)) return d.tau_y / (2 * d.mu);
   const double s = std::sin(d.theta), alpha = std::sqrt(2.0 / 3) * 2 * s / (3 - s);
-  return -alpha * (3 * d.lambda + 2 * d.mu) / (2 * d.mu) * t;
+  const double apex = d.id == kernels::LawId::cohesive_sand ? d.cohesion : 0;
+  return -alpha * (3 * d.lambda + 2 * d.mu) / (2 * d.mu) * (t - apex);
 }
 
 /// The cases that one law is differentiated at: all of the above, and either side of its yield
 /// surface. Sand has its tip at F = I, where no derivative exists.
 inline std::vector<DeformationCase> cases_of(const kernels::LawDescription& d) {
   std::vector<DeformationCase> cases = deformation_cases();
-  if (is_sand(d.id)) cases.pop_back();
+  if (is_sand(d.id) && d.id != kernels::LawId::cohesive_sand) cases.pop_back();
   std::mt19937_64 random(47);
   for (const auto& [name, off] :
        {std::pair<const char*, double>{"yield - 0.3 %", -3e-3}, {"yield + 0.3 %", 3e-3}}) {

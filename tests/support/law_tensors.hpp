@@ -11,9 +11,9 @@
 
 namespace uniphy::testing {
 
-/// A material whose five parameters are leaves that gradients reach.
+/// A material whose parameters are leaves that gradients reach.
 struct MaterialLeaves {
-  std::array<torch::Tensor, 5> leaves;
+  std::array<torch::Tensor, kernels::kLawParameters> leaves;
 
   explicit MaterialLeaves(const kernels::LawDescription& d) {
     for (const kernels::LawParameter& p : kernels::kLawParameterTable)
@@ -21,7 +21,8 @@ struct MaterialLeaves {
   }
   ops::Material material() const {
     ops::Material material;
-    for (int i = 0; i < 5; ++i) material.*ops::kMaterialMembers[i] = leaves[i];
+    for (int i = 0; i < kernels::kLawParameters; ++i)
+      material.*ops::kMaterialMembers[i] = leaves[i];
     return material;
   }
   /// dL/d(log parameter), so that pascals and radians compare; 0 where undefined.
@@ -29,7 +30,7 @@ struct MaterialLeaves {
     const auto g = torch::autograd::grad({loss}, {leaves.begin(), leaves.end()}, {}, true, false,
                                          /*allow_unused=*/true);
     std::vector<double> all;
-    for (int i = 0; i < 5; ++i)
+    for (int i = 0; i < kernels::kLawParameters; ++i)
       all.push_back(g[i].defined() ? g[i].item<double>() * leaves[i].item<double>() : 0);
     return torch::tensor(all, torch::kFloat64);
   }

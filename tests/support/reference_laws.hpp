@@ -44,7 +44,7 @@ inline ReferenceLaw read_reference_law(const std::string& law) {
     return values;
   };
   r.dt = attribute("dt");
-  for (const kernels::LawParameter& p : kernels::kLawParameterTable)
+  for (const kernels::LawParameter& p : kernels::law_parameters(r.description.id))
     r.description.*p.member = attribute(p.name);
   r.F = dataset("F");
   r.C = dataset("C");

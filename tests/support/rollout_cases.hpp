@@ -73,6 +73,9 @@ inline std::vector<RolloutMaterial> rollout_materials() {
     kernels::LawDescription law = sample_law(id);
     // Bodies that yield within 50 steps, yet few particles stand close to the yield surface.
     if (is_plastic(id)) law.tau_y = 500;
+    // A viscosity that shows within them, and a flow that begins smoothly where it yields.
+    if (id == kernels::LawId::carreau) law.eta = 1000, law.eta_inf = 200;
+    if (id == kernels::LawId::herschel_bulkley) law.n = 0.5, law.eta = 200;
     all.push_back({kernels::law_name(id), law, parameters_of(law)});
   }
   for (const auto form : {kernels::LawForm::isotropic, kernels::LawForm::published}) {
@@ -116,11 +119,12 @@ inline RolloutMaterial of_z_alone(RolloutMaterial m) {
 }
 
 /// Where a roll-out of this material starts. Those of learned laws are strained: the published form
-/// is not smooth where singular values meet, and the isotropic one is to yield.
+/// is not smooth where singular values meet, and the isotropic one is to yield; so is cohesive
+/// sand.
 inline RolloutScene scene_of(const RolloutMaterial& m, torch::ScalarType type = torch::kFloat64,
                              int side = 5) {
   RolloutScene scene(type, side);
-  if (m.law.id == kernels::LawId::learned) {
+  if (m.law.id == kernels::LawId::learned || m.law.id == kernels::LawId::cohesive_sand) {
     scene.F = torch::diag(torch::tensor({1.2, 1.0, 0.8}, torch::kFloat64))
                   .repeat({scene.x.size(0), 1, 1})
                   .to(type);
@@ -200,6 +204,7 @@ inline RolloutErrors rollout_errors(const RolloutMaterial& m) {
   errors.velocity = relative_error(found, expected);
 
   const bool learned = m.law.id == kernels::LawId::learned;
+  const bool narrow = m.law.id == kernels::LawId::cohesive_sand;
   found.clear();
   expected.clear();
   for (std::int64_t k = 0; k < m.parameters.size(0); ++k) {
@@ -209,8 +214,10 @@ inline RolloutErrors rollout_errors(const RolloutMaterial& m) {
       moved[k] = p[0];
       return loss_of(scene.run(m.law, moved).x).item<double>();
     };
-    // Of z narrow: each particle that stops to yield within the step is a kink.
-    const auto difference = central_differences(value, {at}, {learned ? 1e-5 : 1e-3 * at});
+    // Narrow where many particles stand near a yield surface: each that crosses it within the step
+    // is a kink.
+    const double step = learned ? 1e-5 : (narrow ? 1e-5 : 1e-3) * at;
+    const auto difference = central_differences(value, {at}, {step});
     errors.sizes.push_back(std::abs(difference[0]));
     found.push_back(grad_p[k].item<double>());
     expected.push_back(difference[0]);

@@ -40,7 +40,7 @@ void bench_laws(const BenchOptions& options, int threads, BenchReport& report) {
   const Tensor F = (torch::eye(3) + 0.1 * torch::randn({n, 3, 3})).requires_grad_();
   const Tensor C = torch::randn({n, 3, 3}).requires_grad_();
   const std::vector<Tensor> grad{torch::randn({n, 3, 3}), torch::randn({n, 3, 3})};
-  const ops::Material material{1e5, 2e5, 5e3, 0.3, 10.0};
+  const ops::Material material{1e5, 2e5, 5e3, 0.3, 10.0, 1e5, 1e4, 1.0, 0.1, 0.6, 0.02};
   for (const std::string& name : options.laws) {
     const kernels::LawId id = kernels::law_id(name);
     Measurer measurer(threads);

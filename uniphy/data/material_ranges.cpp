@@ -32,9 +32,8 @@ LatinHypercube::LatinHypercube(std::int64_t count, std::uint64_t seed) : count_(
   }
 }
 
-std::array<double, 5> LatinHypercube::point(std::int64_t i,
-                                            const std::array<double, 5>& offset) const {
-  std::array<double, 5> unit;
+MaterialParameters LatinHypercube::point(std::int64_t i, const MaterialParameters& offset) const {
+  MaterialParameters unit;
   for (std::size_t k = 0; k < unit.size(); ++k) {
     const auto part = static_cast<double>(part_[k][static_cast<std::size_t>(i)]);
     unit[k] = (part + offset[k]) / static_cast<double>(count_);
@@ -42,7 +41,7 @@ std::array<double, 5> LatinHypercube::point(std::int64_t i,
   return unit;
 }
 
-LawDescription material_at(const MaterialRanges& ranges, const std::array<double, 5>& unit) {
+LawDescription material_at(const MaterialRanges& ranges, const MaterialParameters& unit) {
   LawDescription law;
   law.id = ranges.id;
   for (const kernels::LawParameter& p : kernels::law_parameters(ranges.id)) {

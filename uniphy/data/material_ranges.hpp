@@ -13,7 +13,7 @@ namespace uniphy {
 /// kernels::kLawParameterTable; [0, 0] where the law has none.
 struct MaterialRanges {
   kernels::LawId id = kernels::LawId::elastic;
-  std::array<std::array<double, 2>, 5> interval{};
+  std::array<std::array<double, 2>, kernels::kFamilyParameters> interval{};
 
   std::string name() const { return kernels::law_name(id); }
 };
@@ -29,16 +29,15 @@ class LatinHypercube {
  public:
   LatinHypercube(std::int64_t count, std::uint64_t seed);
   /// The point of trajectory i; `offset` in [0, 1) per parameter is the place inside its part.
-  std::array<double, 5> point(std::int64_t i, const std::array<double, 5>& offset) const;
+  MaterialParameters point(std::int64_t i, const MaterialParameters& offset) const;
 
  private:
   std::int64_t count_;
-  std::array<std::vector<std::int64_t>, 5> part_;
+  std::array<std::vector<std::int64_t>, kernels::kFamilyParameters> part_;
 };
 
 /// Parameters at a point of the unit cube: log-uniform between the ends, theta uniform.
-kernels::LawDescription material_at(const MaterialRanges& ranges,
-                                    const std::array<double, 5>& unit);
+kernels::LawDescription material_at(const MaterialRanges& ranges, const MaterialParameters& unit);
 
 /// The norm of the deviatoric Hencky strain at which a law yields where tr ε is `trace`:
 /// τ_Y/(2μ) for plasticine and non_newtonian; for sand −α (3λ+2μ)/(2μ) trace, and 0 where trace > 0

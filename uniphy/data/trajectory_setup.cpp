@@ -33,7 +33,7 @@ UniformRandom stream(const GenerateOptions& o, Stream which, std::int64_t trajec
 
 LawDescription draw_law(const GenerateOptions& o, std::int64_t trajectory, std::int64_t attempt) {
   UniformRandom random = stream(o, Stream::material, trajectory, attempt);
-  std::array<double, 5> unit;
+  MaterialParameters unit;
   for (double& u : unit) u = random.unit();
   if (2 * attempt < o.attempts) {
     const std::uint64_t strata =

@@ -68,8 +68,10 @@ std::int64_t EvaluatedSet::failed() const {
 
 std::string errors_csv(const std::vector<EvaluatedSet>& sets) {
   std::string csv = "set,trajectory,material,shape,motion";
-  for (const kernels::LawParameter& p : kernels::kLawParameterTable)
+  for (const kernels::LawParameter& p : kernels::kLawParameterTable) {
+    if (p.place >= kernels::kFamilyParameters) break;
     csv += fmt::format(",{}", p.name);
+  }
   csv += ",dt,stress_error,projection_error,rollout_error,failure,z\n";
   for (const EvaluatedSet& set : sets) {
     for (std::size_t i = 0; i < set.rollouts.size(); ++i) {

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
+#include <string>
 #include <utility>
 
 #include "models/trained_model.hpp"
@@ -169,16 +171,41 @@ std::unique_ptr<const FitVariables> make_analytic_variables(
   return std::make_unique<AnalyticFitVariables>(id, ranges, starts, seed);
 }
 
+namespace {
+
+/// The family whose ranges a law begins with.
+kernels::LawId nearest_family(kernels::LawId id) {
+  using kernels::LawId;
+  switch (id) {
+    case LawId::fixed_corotated:
+    case LawId::water:
+    case LawId::mooney_rivlin:
+      return LawId::elastic;  // at small strain
+    case LawId::carreau:
+    case LawId::herschel_bulkley:
+      return LawId::non_newtonian;
+    case LawId::cohesive_sand:
+    case LawId::volume_corrected_sand:
+      return LawId::sand;
+    default:
+      return id;
+  }
+}
+
+}  // namespace
+
 std::vector<std::array<double, 2>> default_ranges(kernels::LawId id) {
-  // The laws beside the five are elastic at small strain.
-  const bool other = id == kernels::LawId::fixed_corotated || id == kernels::LawId::water;
-  const bool sand = id == kernels::LawId::volume_corrected_sand;
-  const kernels::LawId like = other ? kernels::LawId::elastic : sand ? kernels::LawId::sand : id;
+  // Where the five have no such parameter.
+  static const std::map<std::string, std::array<double, 2>> outside{
+      {"c1", {200, 1e6}},    {"c2", {20, 1e5}}, {"eta_inf", {0.1, 100}},
+      {"kappa", {1e-3, 10}}, {"n", {0.2, 1.8}}, {"cohesion", {1e-4, 0.1}}};
   std::vector<std::array<double, 2>> ranges;
   for (const MaterialRanges& material : default_material_ranges()) {
-    if (material.id != like) continue;
-    for (const kernels::LawParameter& p : kernels::law_parameters(id))
-      ranges.push_back(material.interval[p.place]);
+    if (material.id != nearest_family(id)) continue;
+    for (const kernels::LawParameter& p : kernels::law_parameters(id)) {
+      const auto found = outside.find(p.name);
+      ranges.push_back(found != outside.end() ? found->second : material.interval[p.place]);
+    }
   }
   return ranges;
 }

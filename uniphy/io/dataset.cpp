@@ -84,7 +84,7 @@ void DatasetWriter::finish() {
     attempt.push_back(record.attempt);
   }
   writer_.write_strings("trajectories/material", material, {"1", "name of the law"});
-  writer_.write("trajectories/parameters", parameters, {count, kernels::kLawParameters},
+  writer_.write("trajectories/parameters", parameters, {count, kernels::kFamilyParameters},
                 material_parameter_info());
   writer_.write("trajectories/dt", dt, {count}, {"s", "time step"});
   writer_.write("trajectories/density", density, {count}, {"kg/m^3", "density"});
@@ -114,7 +114,7 @@ Dataset read_dataset(const std::filesystem::path& file) {
     reader.fail("/trajectories/material", "expected at least one trajectory, found none");
   }
   const auto parameters =
-      reader.read<double>("trajectories/parameters", {count, kernels::kLawParameters});
+      reader.read<double>("trajectories/parameters", {count, kernels::kFamilyParameters});
   const auto dt = reader.read<double>("trajectories/dt", {count}, hdf5::Values::finite);
   const auto density = reader.read<double>("trajectories/density", {count}, hdf5::Values::finite);
   const auto seed = reader.read<std::int64_t>("trajectories/seed", {count});

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <limits>
+
 #include "ops/kernels/base/error.hpp"
 #include "uniphy/io/hdf5.hpp"
 #include "uniphy/io/material_parameters.hpp"
@@ -77,8 +79,11 @@ void write_latent(const std::filesystem::path& file, const LatentFile& latent) {
                  {"1", "distance in units of the spread of the codes"});
     writer.write_strings("nearest/material", material, {"1", "law behind that code"});
   } else {
-    const MaterialParameters values = parameters_of(latent.analytic);
-    writer.write("parameters", values.data(), {kernels::kLawParameters}, material_parameter_info());
+    std::vector<double> values(kernels::kLawParameters, std::numeric_limits<double>::quiet_NaN());
+    for (const kernels::LawParameter& p : kernels::law_parameters(latent.analytic.id))
+      values[static_cast<std::size_t>(p.place)] = latent.analytic.*p.member;
+    writer.write("parameters", values.data(), {kernels::kLawParameters},
+                 material_parameter_info(kernels::kLawParameters));
   }
   writer.write("velocity/centre", to_vector(latent.centre), {3}, {"m", "centre of mass"});
   writer.write("velocity/linear", to_vector(latent.linear), {3}, {"m/s", "its velocity"});
@@ -121,8 +126,15 @@ LatentFile read_latent(const std::filesystem::path& file) {
     } catch (const Error& error) {
       reader.fail("attribute law of /", error.what());
     }
-    const auto values = reader.read<double>("parameters", {kernels::kLawParameters});
+    const auto values = reader.read<double>("parameters", {-1});
     for (const kernels::LawParameter& p : kernels::law_parameters(latent.analytic.id)) {
+      // Files of the first version hold the parameters of the five families alone.
+      if (static_cast<std::size_t>(p.place) >= values.size()) {
+        reader.fail("/parameters",
+                    fmt::format("expected {} numbers, of which the law {} has {}, "
+                                "found {}",
+                                kernels::kLawParameters, latent.law, p.name, values.size()));
+      }
       const double value = values[p.place];
       if (!(value >= 0)) {
         reader.fail("/parameters", fmt::format("expected {} >= 0, found {}", p.name, value));

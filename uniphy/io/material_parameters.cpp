@@ -13,14 +13,17 @@ MaterialParameters no_parameters() {
 
 MaterialParameters parameters_of(const kernels::LawDescription& law) {
   MaterialParameters parameters = no_parameters();
-  for (const kernels::LawParameter& p : kernels::law_parameters(law.id))
-    parameters[static_cast<std::size_t>(p.place)] = law.*p.member;
+  for (const kernels::LawParameter& p : kernels::law_parameters(law.id)) {
+    if (p.place < kernels::kFamilyParameters)
+      parameters[static_cast<std::size_t>(p.place)] = law.*p.member;
+  }
   return parameters;
 }
 
-hdf5::Info material_parameter_info() {
+hdf5::Info material_parameter_info(int count) {
   std::string units, names;
   for (const kernels::LawParameter& p : kernels::kLawParameterTable) {
+    if (p.place >= count) continue;
     units += (p.place == 0 ? "" : ", ") + std::string(p.unit);
     names += (p.place == 0 ? "" : ", ") + std::string(p.name);
   }

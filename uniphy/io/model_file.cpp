@@ -115,7 +115,7 @@ void write_model(const std::filesystem::path& file, const ModelFile& model, bool
   for (const auto& row : model.parameters) {
     parameters.insert(parameters.end(), row.begin(), row.end());
   }
-  writer.write("latents/parameters", parameters, {count, kernels::kLawParameters},
+  writer.write("latents/parameters", parameters, {count, kernels::kFamilyParameters},
                material_parameter_info());
   writer.commit();
 }
@@ -166,7 +166,7 @@ ModelFile read_model(const std::filesystem::path& file) {
   model.latents = reader.read<double>("latents/z", {count, size}, hdf5::Values::finite);
   hdf5::check_magnitude(reader, "/latents/z", model.latents, kLargestCode);
   const auto parameters =
-      reader.read<double>("latents/parameters", {count, kernels::kLawParameters});
+      reader.read<double>("latents/parameters", {count, kernels::kFamilyParameters});
   model.parameters.resize(static_cast<std::size_t>(count));
   for (std::size_t i = 0; i < model.parameters.size(); ++i) {
     MaterialParameters& row = model.parameters[i];

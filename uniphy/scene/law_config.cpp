@@ -93,6 +93,10 @@ LawSource read_law(Section& law) {
                         "fixed-corotated elastic solid",
                         "inviscid weakly compressible fluid",
                         "",  // sand with an option
+                        "Mooney-Rivlin solid, rubber at moderate strain",
+                        "fluid that thins or thickens with the rate of shear (Carreau)",
+                        "elastoplastic, Drucker-Prager yield, bears some tension",
+                        "viscoplastic, von Mises yield, power of the excess (Herschel-Bulkley)",
                         "a trained model with a latent code"};
   for (int i = 0; i <= static_cast<int>(LawId::learned); ++i) {
     const LawId id = static_cast<LawId>(i);

@@ -12,8 +12,9 @@ namespace {
 
 // In the order of LawId.
 constexpr std::array<const char*, kAnalyticLaws + 1> kNames{
-    "elastic",       "newtonian",       "plasticine", "sand",
-    "non_newtonian", "fixed_corotated", "water",      "volume_corrected_sand",
+    "elastic",       "newtonian",       "plasticine",    "sand",
+    "non_newtonian", "fixed_corotated", "water",         "volume_corrected_sand",
+    "mooney_rivlin", "carreau",         "cohesive_sand", "herschel_bulkley",
     "learned"};
 static_assert(static_cast<int>(LawId::learned) == kAnalyticLaws);
 

@@ -67,6 +67,10 @@ enum class LawId {
   fixed_corotated,        ///< τ = 2μ(F−R)Fᵀ + λJ(J−1)I
   water,                  ///< inviscid: τ = λJ(J−1)I, G(F) = J^{1/3} I
   volume_corrected_sand,  ///< sand that closes up again after a separation; has memory
+  mooney_rivlin,          ///< rubber-like solid
+  carreau,                ///< fluid that thins or thickens with the rate of shear
+  cohesive_sand,          ///< sand that bears some tension
+  herschel_bulkley,       ///< viscoplastic with a power of the excess, StVK-Hencky stress
   learned                 ///< a trained model with a latent code
 };
 
@@ -81,6 +85,11 @@ struct LawDescription {
   double tau_y = 0;                                  ///< Pa
   double theta = 0;                                  ///< friction angle, rad
   double eta = 0;                                    ///< Pa s
+  double c1 = 0, c2 = 0;                             ///< Pa
+  double eta_inf = 0;                                ///< Pa s
+  double kappa = 0;                                  ///< s
+  double n = 0;                                      ///< flow index
+  double cohesion = 0;                               ///< strain
   std::shared_ptr<const LearnedLawWeights> weights;  ///< learned only
   std::vector<double> z;                             ///< learned only, latent_size numbers
 };

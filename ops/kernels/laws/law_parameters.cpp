@@ -30,6 +30,22 @@ std::vector<LawParameter> inviscid_fluid() {
   return rows;
 }
 
+std::vector<LawParameter> shear_fluid() {
+  std::vector<LawParameter> rows = table_rows({&D::lambda, &D::eta, &D::eta_inf, &D::kappa, &D::n});
+  rows[0].text = "bulk modulus";
+  rows[1].text = "viscosity at rest";
+  rows[1].positive = true;
+  return rows;
+}
+
+std::vector<LawParameter> herschel_bulkley() {
+  std::vector<LawParameter> rows = table_rows({&D::mu, &D::lambda, &D::tau_y, &D::eta, &D::n});
+  rows[3].unit = "Pa s^n";
+  rows[3].text = "consistency of the plastic flow";
+  rows[3].positive = true;
+  return rows;
+}
+
 }  // namespace
 
 const std::vector<LawParameter>& law_parameters(LawId id) {
@@ -43,6 +59,10 @@ const std::vector<LawParameter>& law_parameters(LawId id) {
       table_rows({&D::mu, &D::lambda}),
       inviscid_fluid(),
       table_rows({&D::mu, &D::lambda, &D::theta}),
+      table_rows({&D::lambda, &D::c1, &D::c2}),
+      shear_fluid(),
+      table_rows({&D::mu, &D::lambda, &D::theta, &D::cohesion}),
+      herschel_bulkley(),
       {}};
   return all.at(static_cast<std::size_t>(id));
 }

@@ -28,7 +28,14 @@ inline constexpr std::array<LawParameter, kLawParameters> kLawParameterTable{
      {1, "lambda", &LawDescription::lambda, "Pa", "first Lame parameter", true},
      {2, "tau_y", &LawDescription::tau_y, "Pa", "yield stress", false},
      {3, "theta", &LawDescription::theta, "rad", "friction angle", false, 1.5707963267948966},
-     {4, "eta", &LawDescription::eta, "Pa s", "viscosity of the plastic flow", false}}};
+     {4, "eta", &LawDescription::eta, "Pa s", "viscosity of the plastic flow", false},
+     {5, "c1", &LawDescription::c1, "Pa", "first Mooney-Rivlin modulus", true},
+     {6, "c2", &LawDescription::c2, "Pa", "second Mooney-Rivlin modulus", false},
+     {7, "eta_inf", &LawDescription::eta_inf, "Pa s", "viscosity at a high rate of shear", false},
+     {8, "kappa", &LawDescription::kappa, "s", "time scale of the change of viscosity", false},
+     {9, "n", &LawDescription::n, "1", "flow index; below 1: thins with the rate", true},
+     {10, "cohesion", &LawDescription::cohesion, "1", "volumetric strain at which it tears",
+      false}}};
 
 /// Those of a law, in the order of its gradient, with the units and texts that they have there (mu
 /// of newtonian is a viscosity); none for learned.

@@ -9,20 +9,25 @@
 namespace uniphy::kernels {
 
 /// The parameters of an analytic law and, at the same places, the gradient with respect to them.
-/// Units: mu, lambda, tau_y in Pa (mu of newtonian and eta in Pa s), theta in rad.
+/// Units: law_parameters.hpp.
 template <class T>
 struct LawParameters {
   T mu = 0, lambda = 0, tau_y = 0, theta = 0, eta = 0;
+  T c1 = 0, c2 = 0, eta_inf = 0, kappa = 0, n = 0, cohesion = 0;
 };
-inline constexpr int kLawParameters = 5;
+inline constexpr int kLawParameters = 11;
+/// The first of them are all that the five families have.
+inline constexpr int kFamilyParameters = 5;
 /// Its members, for loops over the places.
 template <class T>
 inline constexpr T LawParameters<T>::*kLawParameterMembers[kLawParameters] = {
-    &LawParameters<T>::mu, &LawParameters<T>::lambda, &LawParameters<T>::tau_y,
-    &LawParameters<T>::theta, &LawParameters<T>::eta};
+    &LawParameters<T>::mu,    &LawParameters<T>::lambda,  &LawParameters<T>::tau_y,
+    &LawParameters<T>::theta, &LawParameters<T>::eta,     &LawParameters<T>::c1,
+    &LawParameters<T>::c2,    &LawParameters<T>::eta_inf, &LawParameters<T>::kappa,
+    &LawParameters<T>::n,     &LawParameters<T>::cohesion};
 
 /// The number of analytic laws: LawId before `learned`.
-inline constexpr int kAnalyticLaws = 8;
+inline constexpr int kAnalyticLaws = 12;
 
 /// Entry points of the code compiled for one instruction set. Plain function pointers over views,
 /// one thread, any count; absent views (null data) read as zero and are not written. Memory is that

@@ -52,7 +52,7 @@ void add_rows_of(LawId id, Stage stage, Isa isa, std::mt19937_64& random,
     worst(of_memory.errors[c.group], e.memory);
   }
   rows.push_back(of_F);
-  if (id == LawId::newtonian && stage != Stage::project) rows.push_back(of_C);
+  if (is_viscous_fluid(id) && stage != Stage::project) rows.push_back(of_C);
   if (stage != Stage::project || is_plastic(id)) rows.push_back(of_parameters);
   if (has_memory) rows.push_back(of_memory);
 }

@@ -32,7 +32,7 @@ TEST(Material, GradientsReachTheVector) {
   const Tensor values = torch::tensor({1e5, 2e5, 0.3}, torch::kFloat64).set_requires_grad(true);
   const Tensor packed =
       ops::pack_material("op", LawId::sand, ops::material_of("op", LawId::sand, values));
-  (packed * torch::arange(1, 6, torch::kFloat64)).sum().backward();
+  (packed * torch::arange(1, kernels::kLawParameters + 1, torch::kFloat64)).sum().backward();
   // mu, lambda and theta stand at places 0, 1 and 3.
   EXPECT_TRUE(torch::equal(values.grad(), torch::tensor({1.0, 2.0, 4.0}, torch::kFloat64)));
 }

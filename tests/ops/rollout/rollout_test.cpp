@@ -30,7 +30,7 @@ TEST_P(RolloutOfMaterial, GradientsAgreeWithCentralDifferences) {
   for (std::size_t k = 0; k < errors.parameters.size(); ++k)
     EXPECT_LE(errors.parameters[k], 1e-6) << "parameter " << k;
 }
-INSTANTIATE_TEST_SUITE_P(, RolloutOfMaterial, ::testing::Range(0, 10),
+INSTANTIATE_TEST_SUITE_P(, RolloutOfMaterial, ::testing::Range(0, 14),
                          [](const auto& info) { return rollout_materials()[info.param].name; });
 
 TEST(Rollout, AgreesWithTheReferenceInValueAndGradient) {

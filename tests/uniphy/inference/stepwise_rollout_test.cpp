@@ -70,7 +70,7 @@ TEST_P(StepwiseRollout, AgreesWithTheFusedOneInValueAndGradient) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(, StepwiseRollout, ::testing::Range(0, 10), [](const auto& info) {
+INSTANTIATE_TEST_SUITE_P(, StepwiseRollout, ::testing::Range(0, 14), [](const auto& info) {
   return testing::rollout_materials()[info.param].name;
 });
 

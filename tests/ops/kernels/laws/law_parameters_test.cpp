@@ -51,6 +51,10 @@ TEST(LawParameters, AreThoseOfTheLaw) {
   EXPECT_THAT(names(LawId::sand), ElementsAre("mu", "lambda", "theta"));
   EXPECT_THAT(names(LawId::non_newtonian), ElementsAre("mu", "lambda", "tau_y", "eta"));
   EXPECT_THAT(names(LawId::water), ElementsAre("lambda"));
+  EXPECT_THAT(names(LawId::mooney_rivlin), ElementsAre("lambda", "c1", "c2"));
+  EXPECT_THAT(names(LawId::carreau), ElementsAre("lambda", "eta", "eta_inf", "kappa", "n"));
+  EXPECT_THAT(names(LawId::cohesive_sand), ElementsAre("mu", "lambda", "theta", "cohesion"));
+  EXPECT_THAT(names(LawId::herschel_bulkley), ElementsAre("mu", "lambda", "tau_y", "eta", "n"));
   EXPECT_THAT(names(LawId::learned), ElementsAre());
   EXPECT_STREQ(kernels::law_parameters(LawId::elastic)[0].unit, "Pa");
   EXPECT_STREQ(kernels::law_parameters(LawId::newtonian)[0].unit, "Pa s");

@@ -76,7 +76,8 @@ double largest_difference(const std::string& law) {
   const double volume = size * size * size / double(particles);
   LawDescription description;
   description.id = law_id(law);
-  for (const LawParameter& p : kLawParameterTable) description.*p.member = number(p.name);
+  for (const LawParameter& p : law_parameters(description.id))
+    description.*p.member = number(p.name);
   const Rollout<T> rollout(grid, {{0, particles, make_law<T>(description)}},
                            std::vector<T>(particles, T(number("rho") * volume)),
                            std::vector<T>(particles, T(volume)));
