@@ -11,6 +11,7 @@ packages=(
   gnuplot-nox  # the charts and pictures of the reports
   python3-torch python3-h5py  # torch.ops.uniphy in tests/python, experiments/algorithm2.py
   python3-numpy python3-mpmath pyflakes3  # coefficients of the activations, lint of Python files
+  paraview python3-paraview  # pvpython, whose readers a test tries on a trajectory's XDMF
 )
 
 if ! command -v apt-get >/dev/null || ! command -v dpkg-query >/dev/null; then

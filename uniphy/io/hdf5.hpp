@@ -54,6 +54,10 @@ class Writer {
   void append(const std::string& name, const T* data, std::int64_t rows);
   template <class T>
   void append(const std::string& name, const std::vector<T>& data);
+  /// Makes the dataset `name` that shows row `row` of the extendible dataset `of` and holds no data
+  /// of its own (a virtual dataset, which HDF5 reads from release 1.10 on; the rest of the file
+  /// stays readable to 1.8). It has no attributes.
+  void row_view(const std::string& name, const std::string& of, std::int64_t row);
 
   /// Attributes of a group or dataset ("/" is the file's own); an older value is replaced.
   void attribute(const std::string& object, const std::string& name, const std::string& value);

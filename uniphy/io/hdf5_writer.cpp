@@ -128,9 +128,9 @@ Writer::Writer(const std::filesystem::path& file) : impl_(std::make_unique<Impl>
     throw Error(fmt::format("{}: expected a file, found a directory", file.string()));
   }
   // The format of HDF5 1.8 has checksums on its metadata, so that damage is found, and takes text
-  // attributes longer than 64 KiB.
+  // attributes longer than 64 KiB. Only row views need that of 1.10.
   const Handle access = property_list(H5Pcreate(H5P_FILE_ACCESS));
-  H5Pset_libver_bounds(access, H5F_LIBVER_V18, H5F_LIBVER_V18);
+  H5Pset_libver_bounds(access, H5F_LIBVER_V18, H5F_LIBVER_V110);
   // No times anywhere: the same data make the same file, byte for byte.
   const Handle creation = property_list(H5Pcreate(H5P_FILE_CREATE));
   H5Pset_obj_track_times(creation, false);
@@ -253,6 +253,37 @@ void Writer::append(const std::string& name, const std::vector<T>& data) {
     impl_->fail(full, fmt::format("expected whole rows of {} numbers, found {}", row, data.size()));
   }
   append(name, data.data(), static_cast<std::int64_t>(data.size()) / row);
+}
+
+void Writer::row_view(const std::string& name, const std::string& of, std::int64_t row) {
+  const std::string full = rooted(name), source = rooted(of);
+  const auto found = impl_->extendible.find(source);
+  if (found == impl_->extendible.end()) impl_->fail(source, "expected an extendible dataset");
+  const std::vector<hsize_t>& size = found->second.size;
+  if (row < 0 || static_cast<hsize_t>(row) >= size[0]) {
+    impl_->fail(source, fmt::format("expected a row below {}, found {}", size[0], row));
+  }
+  std::vector<hsize_t> start(size.size(), 0), count = size;
+  start[0] = static_cast<hsize_t>(row);
+  count[0] = 1;
+  const auto rank = static_cast<int>(size.size());
+  const Handle rows = dataspace(H5Screate_simple(rank, size.data(), nullptr));
+  const Handle one = dataspace(H5Screate_simple(rank - 1, size.data() + 1, nullptr));
+  const Handle type = datatype(H5Dget_type(found->second.set));
+  const Handle storage = property_list(H5Pcreate(H5P_DATASET_CREATE));
+  H5Pset_obj_track_times(storage, false);
+  impl_->make_group(full.substr(0, full.rfind('/')));
+  // "." is the file itself, wherever it is and whatever it is called.
+  const bool good = H5Sselect_hyperslab(rows, H5S_SELECT_SET, start.data(), nullptr, count.data(),
+                                        nullptr) >= 0 &&
+                    H5Pset_virtual(storage, one, ".", source.c_str(), rows) >= 0;
+  Handle view;
+  if (good) {
+    view = dataset(
+        H5Dcreate2(impl_->file, full.c_str(), type, one, H5P_DEFAULT, storage, H5P_DEFAULT));
+  }
+  if (!view.valid()) impl_->fail_hdf5(full, "made");
+  impl_->close(view, full);
 }
 
 void Writer::attribute(const std::string& object, const std::string& name,

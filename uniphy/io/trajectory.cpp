@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <numeric>
 
 #include "ops/kernels/base/error.hpp"
 #include "uniphy/io/atomic_file.hpp"
@@ -125,6 +126,15 @@ void TrajectoryWriter::finish(const ParticleState& last) {
     writer_.write(fmt::format("final/{}", field.name), data, with_leading({particles_}, field.row),
                   {field.units, fmt::format("last state: {}", field.description)});
   }
+  for (std::size_t frame = 0; frame < times_.size(); ++frame) {
+    for (const Field& field : fields()) {
+      if (!stored(field, fields_)) continue;
+      writer_.row_view(xdmf_view(frame, field.name), field.name, static_cast<std::int64_t>(frame));
+    }
+  }
+  std::vector<std::int32_t> vertices(static_cast<std::size_t>(particles_));
+  std::iota(vertices.begin(), vertices.end(), 0);
+  writer_.write(kXdmfVertices, vertices, {particles_}, {"1", "points that ParaView draws"});
   const std::filesystem::path file = writer_.file();
   writer_.commit();
   auto xdmf = file;

@@ -14,9 +14,13 @@
 //   /volume [particles]                m^3   volume at rest
 //   /final/{x,v,C,F}                         the last state, from which a run can go on
 //   /final/memory [particles]          1     memory of the laws, where a body's law has one
+//   /xdmf/K/{x,v,C,F}                        frame K of each of the above; views without data
+//   /xdmf/vertex [particles]           1     0, 1, 2, ...
 //
-// Numbers are float64, indices int32 (body) and int64 (step). Every dataset has the attributes
-// `units` and `description`. The XDMF file beside it opens the trajectory in ParaView.
+// Numbers are float64, indices int32 (body, vertex) and int64 (step). Every dataset but the views
+// has the attributes `units` and `description`. The XDMF file beside it opens the trajectory in
+// ParaView, with any of its three readers: these agree on whole datasets alone, and two of them
+// draw a point only where the topology lists it; so /xdmf has a view of every frame, and a list.
 
 #include <cstdint>
 #include <filesystem>
@@ -86,6 +90,9 @@ void write_trajectory(const std::filesystem::path& file, const Trajectory& traje
 /// /final stay empty. Throws Error.
 Trajectory read_trajectory(const std::filesystem::path& file, bool positions_only = false);
 
+/// "xdmf/12/x": the view of one frame of a field, and the list of points.
+std::string xdmf_view(std::size_t frame, const std::string& field);
+constexpr const char* kXdmfVertices = "xdmf/vertex";
 /// The XDMF text for a trajectory file (relative name `h5_name`) with these frames and fields.
 std::string xdmf_text(const std::string& h5_name, std::int64_t particles,
                       const std::vector<double>& times, FrameFields fields);

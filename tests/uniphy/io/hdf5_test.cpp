@@ -139,6 +139,7 @@ TEST(Hdf5, TheSameDataMakeTheSameBytes) {
     writer.write("deep/x", std::vector<double>{1, 2}, {2}, {"m", "numbers"});
     writer.extendible<double>("rows", {2}, {"m", "", 3});
     writer.append("rows", std::vector<double>{1, 2, 3, 4});
+    writer.row_view("views/1", "rows", 1);
     writer.write_strings("texts", {"a", "b"}, {"1", ""});
     writer.attribute("/", "dt", 1e-3);
     writer.commit();
@@ -172,6 +173,10 @@ TEST(Hdf5, WriterRefusesWhatDoesNotFit) {
             "a.h5: /rows: expected whole rows of 3 numbers, found 4");
   EXPECT_EQ(message([&] { writer.append("other", std::vector<double>(3)); }),
             "a.h5: /other: expected an extendible dataset");
+  EXPECT_EQ(message([&] { writer.row_view("views/0", "other", 0); }),
+            "a.h5: /other: expected an extendible dataset");
+  EXPECT_EQ(message([&] { writer.row_view("views/0", "rows", 0); }),
+            "a.h5: /rows: expected a row below 0, found 0");
   EXPECT_EQ(message([&] { Writer(scratch.file("none/b.h5")); }),
             "none/b.h5: cannot be written: No such file or directory");
   std::filesystem::create_directory(scratch.file("folder.h5"));
