@@ -40,6 +40,16 @@ void plot_curve(const TrajectoryComparison& comparison, const std::filesystem::p
   plot_chart(file, chart);
 }
 
+// With a word where it is only the beginning of a run.
+Trajectory read_compared(const std::filesystem::path& file, bool warn) {
+  Trajectory trajectory = read_trajectory(file, true);
+  if (warn && !trajectory.failure.empty()) {
+    fmt::print(stderr, "warning: {}: ends at {:.6g} s because its run failed: {}\n", file.string(),
+               trajectory.time.back(), trajectory.failure);
+  }
+  return trajectory;
+}
+
 RunFunction trajectory_stage(Section& config) {
   const std::filesystem::path predicted =
       config.input_file("trajectory", required, "what is judged");
@@ -49,10 +59,10 @@ RunFunction trajectory_stage(Section& config) {
       config.choice("frames", std::string("all"), {"all", "common"},
                     "all: the times must be the same; common: those that both have");
   return [=](RunDirectory& out, Metrics& metrics) {
-    const auto comparison =
-        compare_trajectories(read_trajectory(predicted, true), read_trajectory(reference, true),
-                             frames == "common" ? FrameMatch::common : FrameMatch::all,
-                             predicted.string(), reference.string());
+    const bool common = frames == "common";
+    const auto comparison = compare_trajectories(
+        read_compared(predicted, common), read_compared(reference, common),
+        common ? FrameMatch::common : FrameMatch::all, predicted.string(), reference.string());
     metrics.set("position_mse", comparison.position_mse);
     metrics.set("root_mse", std::sqrt(comparison.position_mse));
     metrics.set("root_over_size", comparison.root_over_size);

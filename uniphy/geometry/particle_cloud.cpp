@@ -9,6 +9,7 @@
 #include "uniphy/io/atomic_file.hpp"
 #include "uniphy/io/hdf5.hpp"
 #include "uniphy/io/text_lines.hpp"
+#include "uniphy/io/trajectory.hpp"
 
 namespace uniphy {
 namespace {
@@ -32,6 +33,7 @@ ParticleCloud read_particles_hdf5(const std::filesystem::path& file, std::int64_
   }
   if (numbers.empty()) reader.fail("/x", "expected particles, found none");
   ParticleCloud cloud;
+  cloud.failure = trajectory_failure(reader);
   const std::size_t count = numbers.size() / 3;
   cloud.x.reserve(count);
   for (std::size_t p = 0; p < count; ++p) {

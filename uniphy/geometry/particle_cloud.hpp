@@ -17,6 +17,8 @@ struct ParticleCloud {
   std::vector<Eigen::Vector3d> x;  ///< m
   /// m³ of each particle: as long as x, or empty where the file has none.
   std::vector<double> volume;
+  /// Of a trajectory whose run failed (trajectory.hpp): why; else empty.
+  std::string failure;
 
   Bounds bounds() const { return bounds_of(x); }
 };

@@ -126,6 +126,17 @@ void TrajectoryWriter::finish(const ParticleState& last) {
     writer_.write(fmt::format("final/{}", field.name), data, with_leading({particles_}, field.row),
                   {field.units, fmt::format("last state: {}", field.description)});
   }
+  writer_.attribute("/", "complete", 1);
+  commit();
+}
+
+void TrajectoryWriter::finish_incomplete(const std::string& failure) {
+  writer_.attribute("/", "complete", 0);
+  writer_.attribute("/", "error", failure);
+  commit();
+}
+
+void TrajectoryWriter::commit() {
   for (std::size_t frame = 0; frame < times_.size(); ++frame) {
     for (const Field& field : fields()) {
       if (!stored(field, fields_)) continue;
@@ -161,7 +172,20 @@ void write_trajectory(const std::filesystem::path& file, const Trajectory& traje
     const auto at = static_cast<std::size_t>(frame);
     writer.append(trajectory.time.at(at), trajectory.step.at(at), state);
   }
-  writer.finish(trajectory.last);
+  if (trajectory.failure.empty()) {
+    writer.finish(trajectory.last);
+  } else {
+    writer.finish_incomplete(trajectory.failure);
+  }
+}
+
+std::string trajectory_failure(const hdf5::Reader& reader) {
+  // Files of older versions have no such attribute; theirs are complete.
+  if (!reader.has_attribute("/", "complete") || reader.attribute_integer("/", "complete") != 0) {
+    return "";
+  }
+  const std::string failure = reader.attribute_text("/", "error");
+  return failure.empty() ? "unknown" : failure;
 }
 
 Trajectory read_trajectory(const std::filesystem::path& file, bool positions_only) {
@@ -189,6 +213,7 @@ Trajectory read_trajectory(const std::filesystem::path& file, bool positions_onl
   trajectory.mass = reader.read<double>("mass", {trajectory.particles}, hdf5::Values::finite);
   trajectory.volume = reader.read<double>("volume", {trajectory.particles}, hdf5::Values::finite);
   trajectory.scene = reader.attribute_text("/", "scene");
+  trajectory.failure = trajectory_failure(reader);
   if (positions_only) return trajectory;
   for (const Field& field : fields()) {
     if (field.name[0] != 'x' && field.frames != nullptr && reader.has(field.name)) {

@@ -2,7 +2,9 @@
 
 // trajectory.h5: how an object moved.
 //
-//   attributes  format = "uniphy-trajectory", version = 1, scene = YAML of the scene
+//   attributes  format = "uniphy-trajectory", version = 1, scene = YAML of the scene;
+//               complete = 1, or 0 where the run ended before its time: then error says why, the
+//               frames until then are there, and /final is not
 //   /x      [frames, particles, 3]     m     positions
 //   /time   [frames]                   s
 //   /step   [frames]                   1     index of the MPM step
@@ -60,6 +62,7 @@ struct Trajectory : TrajectoryHeader {
   std::vector<double> C;           ///< [frames, particles, 3, 3] or empty
   std::vector<double> F;           ///< [frames, particles, 3, 3] or empty
   ParticleState last;              ///< /final, empty arrays where absent
+  std::string failure;             ///< why the run ended before its time; empty: it did not
 
   const double* positions(std::int64_t frame) const { return x.data() + frame * particles * 3; }
 };
@@ -72,11 +75,17 @@ class TrajectoryWriter {
                    FrameFields fields = {}, int gzip = 0);
   /// state.x and the declared fields must be there. Times and steps must increase.
   void append(double time, std::int64_t step, const ParticleState& state);
-  /// Writes /final, names the file, writes the XDMF beside it. Nothing is kept without it.
+  /// Writes /final, names the file, writes the XDMF beside it. Nothing is kept without this or:
   void finish(const ParticleState& last);
+  /// The same for a run that failed, without a last state: `failure` says why.
+  void finish_incomplete(const std::string& failure);
   std::int64_t frames() const { return static_cast<std::int64_t>(times_.size()); }
+  /// s, of the last frame, of which there must be one.
+  double last_time() const { return times_.back(); }
 
  private:
+  void commit();
+
   hdf5::Writer writer_;
   std::int64_t particles_;
   FrameFields fields_;
@@ -86,9 +95,12 @@ class TrajectoryWriter {
 
 void write_trajectory(const std::filesystem::path& file, const Trajectory& trajectory);
 
-/// Checks format, shapes, finite positions, increasing times. With `positions_only` v, C, F and
-/// /final stay empty. Throws Error.
+/// Checks format, shapes, finite positions, increasing times; an incomplete file is read, too. With
+/// `positions_only` v, C, F and /final stay empty. Throws Error.
 Trajectory read_trajectory(const std::filesystem::path& file, bool positions_only = false);
+
+/// Why the run behind an open trajectory ended before its time; empty: it did not.
+std::string trajectory_failure(const hdf5::Reader& reader);
 
 /// "xdmf/12/x": the view of one frame of a field, and the list of points.
 std::string xdmf_view(std::size_t frame, const std::string& field);

@@ -46,6 +46,14 @@ std::vector<std::pair<std::int64_t, std::int64_t>> pair_frames(const Trajectory&
   return pairs;
 }
 
+void check_complete(const Trajectory& trajectory, const std::string& name) {
+  if (trajectory.failure.empty()) return;
+  throw Error(fmt::format(
+      "{}: expected a complete trajectory, found one that ends at {:.6g} s because its run failed "
+      "({}); frames: common compares the frames that it has",
+      name, trajectory.frames > 0 ? trajectory.time.back() : 0.0, trajectory.failure));
+}
+
 }  // namespace
 
 TrajectoryComparison compare_trajectories(const Trajectory& predicted, const Trajectory& reference,
@@ -56,6 +64,10 @@ TrajectoryComparison compare_trajectories(const Trajectory& predicted, const Tra
                             reference.particles, reference_name, predicted.particles));
   }
   if (reference.particles == 0) throw Error(reference_name + ": expected particles, found none");
+  if (match == FrameMatch::all) {
+    check_complete(predicted, predicted_name);
+    check_complete(reference, reference_name);
+  }
   const auto pairs = pair_frames(predicted, reference);
   const auto matched = static_cast<std::int64_t>(pairs.size());
   if (match == FrameMatch::all && (matched != predicted.frames || matched != reference.frames)) {

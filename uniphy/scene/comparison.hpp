@@ -22,7 +22,7 @@ struct TrajectoryComparison {
 
 /// Which frames are compared.
 enum class FrameMatch {
-  all,    ///< the trajectories must have the same times
+  all,    ///< the trajectories must have the same times and be complete
   common  ///< the times that both have
 };
 

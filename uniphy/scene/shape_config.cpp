@@ -160,6 +160,10 @@ ShapeLoader read_cloud(Section& s) {
       throw Error(file.string() + ": expected /volume or particle_volume, found both");
     }
     const ParticleCloud& cloud = *body->cloud;
+    if (!cloud.failure.empty()) {
+      std::fprintf(stderr, "warning: %s: is of a run that failed: %s\n", file.c_str(),
+                   cloud.failure.c_str());
+    }
     if (volume > 0 || !cloud.volume.empty()) {
       const std::string odd =
           odd_scale(cloud, volume > 0 ? std::vector<double>{volume} : cloud.volume);

@@ -43,6 +43,45 @@ void record_metrics(const SceneDescription& scene, const PlacedScene& placed, Me
   }
 }
 
+/// Draws frames of a trajectory, evenly spread, its first and last one included.
+void draw_frames(const std::filesystem::path& png, const std::filesystem::path& trajectory,
+                 const SimulationOutput& output) {
+  if (output.picture_frames == 0) return;
+  const hdf5::Reader reader(trajectory);
+  const hdf5::Shape shape = reader.shape("x");
+  const auto time = reader.read<double>("time", {shape[0]});
+  const auto body = reader.read<std::int32_t>("body", {shape[1]});
+  ParticlePicture picture;
+  picture.columns = static_cast<int>(std::min<std::int64_t>(output.picture_frames, 6));
+  if (!trajectory_failure(reader).empty()) picture.title = "incomplete";
+  for (std::int64_t frame = 0; frame < shape[0]; ++frame) {
+    if (!is_pictured(frame, shape[0], output.picture_frames)) continue;
+    ParticlePanel panel;
+    panel.caption = fmt::format("{:.3f} s", time[static_cast<std::size_t>(frame)]);
+    panel.x = reader.read_rows<double>("x", {-1, shape[1], 3}, frame, 1);
+    if (body.back() > 0) panel.colour.assign(body.begin(), body.end());
+    picture.panels.push_back(std::move(panel));
+  }
+  plot_particles(png, picture);
+}
+
+/// What a run that failed has computed is all that shows why. Throws nothing: the failure itself is
+/// what the user has to hear of last.
+void keep_frames(TrajectoryWriter& writer, const std::string& failure,
+                 const SimulationOutput& output, const RunDirectory& out) {
+  const std::filesystem::path file = out.file("trajectory.h5");
+  try {
+    writer.finish_incomplete(failure);
+    // That of an earlier run would pass for one of this.
+    if (output.observation) std::filesystem::remove(out.file("observation.h5"));
+    fmt::print(stderr, "warning: {}: keeps the frames up to {:.6g} s, marked as incomplete\n",
+               file.string(), writer.last_time());
+    draw_frames(out.file("frames.png"), file, output);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "warning: not all of the frames could be kept: {}\n", error.what());
+  }
+}
+
 }  // namespace
 
 SimulationOutput read_simulation_output(Section& config) {
@@ -86,27 +125,25 @@ void simulate_into(const SceneDescription& scene, const SimulationOutput& output
   TrajectoryWriter writer(out.file("trajectory.h5"), header, output.fields, output.gzip);
 
   Observation seen = begin_observation(placed.grid, scene.bodies.front().density, placed.volume);
-  const std::int64_t frames = placed.steps / scene.frame_stride + 1;
-  ParticlePicture picture;
-  picture.columns = static_cast<int>(std::min<std::int64_t>(output.picture_frames, 6));
   Progress progress("simulate", placed.steps);
   const auto start = std::chrono::steady_clock::now();
-  const ParticleState last =
-      run_scene(scene, placed, output.fields,
-                [&](double time, std::int64_t step, const ParticleState& state) {
-                  if (is_pictured(writer.frames(), frames, output.picture_frames)) {
-                    ParticlePanel panel;
-                    panel.caption = fmt::format("{:.3f} s", time);
-                    panel.x = state.x;
-                    if (scene.bodies.size() > 1)
-                      panel.colour.assign(placed.body.begin(), placed.body.end());
-                    picture.panels.push_back(std::move(panel));
-                  }
-                  writer.append(time, step, state);
-                  if (output.observation) add_frame(seen, time, state.x);
-                  progress.update(step);
-                  return true;
-                });
+  ParticleState last;
+  bool storing = false;  // what fails while a frame is written may leave a part of it
+  try {
+    last = run_scene(scene, placed, output.fields,
+                     [&](double time, std::int64_t step, const ParticleState& state) {
+                       storing = true;
+                       writer.append(time, step, state);
+                       storing = false;
+                       if (output.observation) add_frame(seen, time, state.x);
+                       progress.update(step);
+                       return true;
+                     });
+  } catch (const std::exception& error) {
+    progress.finish();
+    if (!storing && writer.frames() > 0) keep_frames(writer, error.what(), output, out);
+    throw;
+  }
   const double seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   progress.finish();
@@ -116,7 +153,7 @@ void simulate_into(const SceneDescription& scene, const SimulationOutput& output
   const double particle_steps =
       static_cast<double>(placed.particles()) * static_cast<double>(placed.steps);
   if (particle_steps > 0) metrics.set("ns_per_particle_step", 1e9 * seconds / particle_steps);
-  if (!picture.panels.empty()) plot_particles(out.file("frames.png"), picture);
+  draw_frames(out.file("frames.png"), out.file("trajectory.h5"), output);
 }
 
 }  // namespace uniphy

@@ -23,6 +23,10 @@ SimulationOutput read_simulation_output(Section& config);
 /// observation.h5 into `out`; frames go to the disk as they come. Metrics: dt, stable_dt (s),
 /// steps, frames, simulated_s, particles and, for each body, particles.NAME,
 /// particles_per_cell.NAME and volume.NAME (m³), mass (kg), ns_per_particle_step.
+///
+/// A run that fails or is interrupted between two frames leaves the frames that it has: an
+/// incomplete trajectory.h5 (trajectory.hpp), trajectory.xdmf and frames.png, in place of those of
+/// an earlier run. What ended it is thrown on.
 void simulate_into(const SceneDescription& scene, const SimulationOutput& output, RunDirectory& out,
                    Metrics& metrics);
 

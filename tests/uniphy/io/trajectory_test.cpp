@@ -122,6 +122,20 @@ TEST(TrajectoryWriter, LeavesNothingBehindWithoutFinish) {
   EXPECT_TRUE(std::filesystem::is_empty(scratch.path()));
 }
 
+TEST(Trajectory, AnIncompleteOneSaysWhy) {
+  const testing::Scratch scratch;
+  Trajectory written = example(3, 4);
+  write_trajectory(scratch.file("t.h5"), written);
+  EXPECT_EQ(read_trajectory(scratch.file("t.h5")).failure, "");
+  written.failure = "particle 2 left the grid";
+  write_trajectory(scratch.file("t.h5"), written);
+  const Trajectory read = read_trajectory(scratch.file("t.h5"));
+  EXPECT_EQ(read.failure, written.failure);
+  EXPECT_EQ(read.x, written.x);
+  EXPECT_TRUE(read.last.x.empty());
+  EXPECT_EQ(hdf5::Reader(scratch.file("t.h5")).attribute_integer("/", "complete"), 0);
+}
+
 TEST(TrajectoryWriter, RefusesWhatDoesNotFit) {
   const testing::Scratch scratch;
   const auto message = [&](auto function) {

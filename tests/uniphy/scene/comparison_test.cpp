@@ -81,5 +81,16 @@ TEST(CompareTrajectories, RefusesWhatDoesNotMatch) {
   EXPECT_THAT(error_of(late, still(3), FrameMatch::common), HasSubstr("no time in common"));
 }
 
+TEST(CompareTrajectories, IncompleteOnesAreRefusedUnlessTheirFramesAreAskedFor) {
+  Trajectory incomplete = still(3);
+  incomplete.failure = "particle 4 left the grid";
+  const std::string expected =
+      "a.h5: expected a complete trajectory, found one that ends at 0.2 s because its run failed "
+      "(particle 4 left the grid); frames: common compares the frames that it has";
+  EXPECT_EQ(error_of(incomplete, incomplete, FrameMatch::all), expected);
+  EXPECT_EQ(error_of(incomplete, still(3), FrameMatch::all), expected);
+  EXPECT_EQ(error_of(incomplete, still(4), FrameMatch::common), "no error");
+}
+
 }  // namespace
 }  // namespace uniphy
