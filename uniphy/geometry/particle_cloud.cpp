@@ -33,6 +33,7 @@ ParticleCloud read_particles_hdf5(const std::filesystem::path& file, std::int64_
   }
   if (numbers.empty()) reader.fail("/x", "expected particles, found none");
   ParticleCloud cloud;
+  cloud.of_trajectory = is_trajectory(reader);
   cloud.failure = trajectory_failure(reader);
   const std::size_t count = numbers.size() / 3;
   cloud.x.reserve(count);

@@ -17,6 +17,7 @@ struct ParticleCloud {
   std::vector<Eigen::Vector3d> x;  ///< m
   /// m³ of each particle: as long as x, or empty where the file has none.
   std::vector<double> volume;
+  bool of_trajectory = false;  ///< positions of particles that were deformed and in motion
   /// Of a trajectory whose run failed (trajectory.hpp): why; else empty.
   std::string failure;
 

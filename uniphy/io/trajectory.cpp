@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "ops/kernels/base/error.hpp"
+#include "ops/kernels/base/hash.hpp"
 #include "uniphy/io/atomic_file.hpp"
 
 namespace uniphy {
@@ -73,6 +74,42 @@ void check_size(const hdf5::Writer& writer, const char* name, std::size_t found,
   }
 }
 
+/// Of all that a run goes on from.
+std::string checksum(const ParticleState& last, const RunPoint& end) {
+  kernels::Hash hash;
+  for (const Field& field : fields()) hash.add(last.*field.state);
+  hash.add(end.sorted_x).add(fmt::format("{} {} {}", end.step, end.steps_sorted, end.scene_hash));
+  return hash.text();
+}
+
+ParticleState read_last(const hdf5::Reader& reader, std::int64_t particles) {
+  ParticleState last;
+  for (const Field& field : fields()) {
+    const std::string name = fmt::format("/final/{}", field.name);
+    if (!reader.has(name)) continue;
+    last.*field.state =
+        reader.read<double>(name, with_leading({particles}, field.row), hdf5::Values::finite);
+  }
+  return last;
+}
+
+std::optional<RunPoint> read_end(const hdf5::Reader& reader, const ParticleState& last) {
+  if (!reader.has("/final/sorted_x") || last.x.empty()) return {};
+  RunPoint end;
+  end.sorted_x = reader.read<double>(
+      "/final/sorted_x", {static_cast<std::int64_t>(last.x.size() / 3), 3}, hdf5::Values::finite);
+  end.step = reader.attribute_integer("/final", "step");
+  end.steps_sorted = reader.attribute_integer("/final", "steps_sorted");
+  end.scene_hash = reader.attribute_text("/final", "scene_hash");
+  const std::string found = checksum(last, end);
+  const std::string expected = reader.attribute_text("/final", "checksum");
+  if (found != expected) {
+    reader.fail("/final", fmt::format("expected the checksum {}, found {}; the file is damaged",
+                                      expected, found));
+  }
+  return end;
+}
+
 }  // namespace
 
 TrajectoryWriter::TrajectoryWriter(const std::filesystem::path& file,
@@ -118,13 +155,22 @@ void TrajectoryWriter::append(double time, std::int64_t step, const ParticleStat
   last_step_ = step;
 }
 
-void TrajectoryWriter::finish(const ParticleState& last) {
+void TrajectoryWriter::finish(const ParticleState& last, const RunPoint* end) {
   for (const Field& field : fields()) {
     const std::vector<double>& data = last.*field.state;
     if (data.empty()) continue;
     check_size(writer_, field.name, data.size(), particles_ * row_size(field));
     writer_.write(fmt::format("final/{}", field.name), data, with_leading({particles_}, field.row),
                   {field.units, fmt::format("last state: {}", field.description)});
+  }
+  if (end != nullptr) {
+    check_size(writer_, "final/sorted_x", end->sorted_x.size(), 3 * particles_);
+    writer_.write("final/sorted_x", end->sorted_x, {particles_, 3},
+                  {"m", "positions by which the particles were last sorted"});
+    writer_.attribute("final", "step", end->step);
+    writer_.attribute("final", "steps_sorted", end->steps_sorted);
+    writer_.attribute("final", "scene_hash", end->scene_hash);
+    writer_.attribute("final", "checksum", checksum(last, *end));
   }
   writer_.attribute("/", "complete", 1);
   commit();
@@ -173,10 +219,14 @@ void write_trajectory(const std::filesystem::path& file, const Trajectory& traje
     writer.append(trajectory.time.at(at), trajectory.step.at(at), state);
   }
   if (trajectory.failure.empty()) {
-    writer.finish(trajectory.last);
+    writer.finish(trajectory.last, trajectory.end ? &*trajectory.end : nullptr);
   } else {
     writer.finish_incomplete(trajectory.failure);
   }
+}
+
+bool is_trajectory(const hdf5::Reader& reader) {
+  return reader.has_attribute("/", "format") && reader.attribute_text("/", "format") == kFormat;
 }
 
 std::string trajectory_failure(const hdf5::Reader& reader) {
@@ -221,13 +271,31 @@ Trajectory read_trajectory(const std::filesystem::path& file, bool positions_onl
           field.name, with_leading({trajectory.frames, trajectory.particles}, field.row),
           hdf5::Values::finite);
     }
-    const std::string last = fmt::format("/final/{}", field.name);
-    if (reader.has(last)) {
-      trajectory.last.*field.state = reader.read<double>(
-          last, with_leading({trajectory.particles}, field.row), hdf5::Values::finite);
-    }
   }
+  trajectory.last = read_last(reader, trajectory.particles);
+  trajectory.end = read_end(reader, trajectory.last);
   return trajectory;
+}
+
+RunState read_run_state(const std::filesystem::path& file) {
+  const hdf5::Reader reader(file);
+  reader.check_format(kFormat, 1);
+  const std::string failure = trajectory_failure(reader);
+  if (!failure.empty()) {
+    throw Error(fmt::format("{}: expected a complete trajectory, found one whose run failed: {}",
+                            file.string(), failure));
+  }
+  RunState state;
+  state.particles = read_last(reader, reader.shape("/mass").at(0));
+  const auto end = read_end(reader, state.particles);
+  if (!end) {
+    reader.fail("/final",
+                "expected a last state that a run can go on from, found none; the file was not "
+                "written by a simulation of a scene, or by an older version");
+  }
+  state.point = *end;
+  state.scene = reader.attribute_text("/", "scene");
+  return state;
 }
 
 }  // namespace uniphy

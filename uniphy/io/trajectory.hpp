@@ -14,8 +14,13 @@
 //   /body   [particles]                1     index of the body in the scene
 //   /mass   [particles]                kg
 //   /volume [particles]                m^3   volume at rest
-//   /final/{x,v,C,F}                         the last state, from which a run can go on
+//   /final/{x,v,C,F}                         the last state
 //   /final/memory [particles]          1     memory of the laws, where a body's law has one
+//   /final/sorted_x [particles, 3]     m     positions by which the particles were last sorted
+//   attributes of /final, where a simulation of a scene wrote it: step = its MPM step, steps_sorted
+//               = steps since then, scene_hash = of masses, volumes and laws, checksum = of the
+//               state. From such a file a run goes on to the bits of an uninterrupted one
+//               (scene.continue); without them, the last state is only to be looked at.
 //   /xdmf/K/{x,v,C,F}                        frame K of each of the above; views without data
 //   /xdmf/vertex [particles]           1     0, 1, 2, ...
 //
@@ -45,6 +50,14 @@ struct TrajectoryHeader {
   std::string scene;               ///< YAML
 };
 
+/// What a run needs besides the last particles to go on to the bits of an uninterrupted one.
+struct RunPoint {
+  std::int64_t step = 0;          ///< steps that lead to the state
+  std::int64_t steps_sorted = 0;  ///< since the particles were sorted (kernels::SortState)
+  std::vector<double> sorted_x;   ///< [particles, 3] m, where they were then
+  std::string scene_hash;         ///< of the scene that the state belongs to
+};
+
 /// Which optional fields every frame stores.
 struct FrameFields {
   bool v = false;
@@ -62,6 +75,7 @@ struct Trajectory : TrajectoryHeader {
   std::vector<double> C;           ///< [frames, particles, 3, 3] or empty
   std::vector<double> F;           ///< [frames, particles, 3, 3] or empty
   ParticleState last;              ///< /final, empty arrays where absent
+  std::optional<RunPoint> end;     ///< where the run stood in `last`
   std::string failure;             ///< why the run ended before its time; empty: it did not
 
   const double* positions(std::int64_t frame) const { return x.data() + frame * particles * 3; }
@@ -76,7 +90,8 @@ class TrajectoryWriter {
   /// state.x and the declared fields must be there. Times and steps must increase.
   void append(double time, std::int64_t step, const ParticleState& state);
   /// Writes /final, names the file, writes the XDMF beside it. Nothing is kept without this or:
-  void finish(const ParticleState& last);
+  /// `end` (null: none): what lets a run go on from `last`.
+  void finish(const ParticleState& last, const RunPoint* end = nullptr);
   /// The same for a run that failed, without a last state: `failure` says why.
   void finish_incomplete(const std::string& failure);
   std::int64_t frames() const { return static_cast<std::int64_t>(times_.size()); }
@@ -99,6 +114,18 @@ void write_trajectory(const std::filesystem::path& file, const Trajectory& traje
 /// `positions_only` v, C, F and /final stay empty. Throws Error.
 Trajectory read_trajectory(const std::filesystem::path& file, bool positions_only = false);
 
+/// A state from which a run goes on, and the scene (YAML) that it is of.
+struct RunState {
+  ParticleState particles;
+  RunPoint point;
+  std::string scene;
+};
+/// The last state of a trajectory, without its frames. Throws Error where the file is incomplete,
+/// holds none to go on from, or was damaged.
+RunState read_run_state(const std::filesystem::path& file);
+
+/// Whether an open file is a trajectory, whatever else may be wrong with it.
+bool is_trajectory(const hdf5::Reader& reader);
 /// Why the run behind an open trajectory ended before its time; empty: it did not.
 std::string trajectory_failure(const hdf5::Reader& reader);
 

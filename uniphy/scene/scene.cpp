@@ -9,6 +9,7 @@
 #include <numeric>
 
 #include "ops/kernels/base/error.hpp"
+#include "uniphy/scene/continued_run.hpp"
 #include "uniphy/scene/grid_memory.hpp"
 #include "uniphy/scene/overlap.hpp"
 
@@ -123,18 +124,51 @@ ParticleState widened(const kernels::ParticleState<T>& state) {
 }
 
 template <class T>
+kernels::ParticleState<T> narrowed(const ParticleState& state) {
+  return {cast<T>(state.x), cast<T>(state.v), cast<T>(state.C), cast<T>(state.F),
+          cast<T>(state.memory)};
+}
+
+template <class T>
 ParticleState run(const SceneDescription& scene, const PlacedScene& placed, FrameFields fields,
-                  const FrameFunction& on_frame) {
+                  const FrameFunction& on_frame, RunPoint* end) {
   Scene<T> runnable = build_scene<T>(scene, placed);
+  kernels::SortState<T> sort;
+  std::int64_t step = 0;
+  if (placed.start) {
+    const RunPoint& point = placed.start->point;
+    step = point.step;
+    sort = {point.steps_sorted, cast<T>(point.sorted_x)};
+  }
   kernels::RunOptions<T> options;
   options.every = scene.frame_stride;
   options.frame_v = fields.v;
   options.frame_C = fields.C;
   options.frame_F = fields.F;
-  options.on_frame = [&](std::ptrdiff_t step, const kernels::ParticleState<T>& state) {
-    return on_frame(static_cast<double>(step) * placed.grid.dt, step, widened(state));
+  options.sort = &sort;
+  options.on_frame = [&](std::ptrdiff_t at, const kernels::ParticleState<T>& state) {
+    return on_frame(static_cast<double>(at) * placed.grid.dt, at, widened(state));
   };
-  runnable.rollout.run(runnable.initial, placed.steps, options);
+  const auto advance = [&](std::int64_t steps) {
+    options.first_step = step;
+    const std::int64_t done = runnable.rollout.run(runnable.initial, steps, options);
+    step += done;
+    return done == steps;
+  };
+  // The roll-out counts frames from its first step; here they stay at multiples of the stride.
+  const std::int64_t to_frame =
+      (scene.frame_stride - step % scene.frame_stride) % scene.frame_stride;
+  if (to_frame == 0) {
+    advance(placed.steps);
+  } else if (advance(std::min(to_frame, placed.steps)) && to_frame <= placed.steps) {
+    advance(placed.steps - to_frame);
+  }
+  if (end != nullptr) {
+    end->step = step;
+    end->steps_sorted = sort.steps;
+    end->sorted_x.assign(sort.x.begin(), sort.x.end());
+    end->scene_hash = scene_hash(scene, placed);
+  }
   return widened(runnable.initial);
 }
 
@@ -198,15 +232,17 @@ Scene<T> build_scene(const SceneDescription& scene, const PlacedScene& placed) {
   }
   return {kernels::Rollout<T>(placed.grid, std::move(ranges), cast<T>(placed.mass),
                               cast<T>(placed.volume)),
-          kernels::ParticleState<T>::undeformed(cast<T>(placed.x), cast<T>(placed.v))};
+          placed.start
+              ? narrowed<T>(placed.start->particles)
+              : kernels::ParticleState<T>::undeformed(cast<T>(placed.x), cast<T>(placed.v))};
 }
 template Scene<float> build_scene<float>(const SceneDescription&, const PlacedScene&);
 template Scene<double> build_scene<double>(const SceneDescription&, const PlacedScene&);
 
 ParticleState run_scene(const SceneDescription& scene, const PlacedScene& placed,
-                        FrameFields fields, const FrameFunction& on_frame) {
-  return scene.single_precision ? run<float>(scene, placed, fields, on_frame)
-                                : run<double>(scene, placed, fields, on_frame);
+                        FrameFields fields, const FrameFunction& on_frame, RunPoint* end) {
+  return scene.single_precision ? run<float>(scene, placed, fields, on_frame, end)
+                                : run<double>(scene, placed, fields, on_frame, end);
 }
 
 Trajectory run_scene(const SceneDescription& scene, FrameFields fields, const std::string& yaml) {
@@ -220,17 +256,20 @@ Trajectory run_scene(const SceneDescription& scene, FrameFields fields, const st
   const auto append = [](const std::vector<double>& from, std::vector<double>* to) {
     to->insert(to->end(), from.begin(), from.end());
   };
-  trajectory.last = run_scene(scene, placed, fields,
-                              [&](double time, std::int64_t step, const ParticleState& state) {
-                                trajectory.time.push_back(time);
-                                trajectory.step.push_back(step);
-                                append(state.x, &trajectory.x);
-                                append(state.v, &trajectory.v);
-                                append(state.C, &trajectory.C);
-                                append(state.F, &trajectory.F);
-                                ++trajectory.frames;
-                                return true;
-                              });
+  trajectory.end.emplace();
+  trajectory.last = run_scene(
+      scene, placed, fields,
+      [&](double time, std::int64_t step, const ParticleState& state) {
+        trajectory.time.push_back(time);
+        trajectory.step.push_back(step);
+        append(state.x, &trajectory.x);
+        append(state.v, &trajectory.v);
+        append(state.C, &trajectory.C);
+        append(state.F, &trajectory.F);
+        ++trajectory.frames;
+        return true;
+      },
+      &*trajectory.end);
   return trajectory;
 }
 

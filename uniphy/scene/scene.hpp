@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <optional>
 #include <string>
@@ -28,9 +29,10 @@ struct SceneDescription {
   std::optional<double> dt;         ///< s; absent: from stable_time_step, rounded down
   double safety = kTimeStepSafety;  ///< share of the stable step that an automatic dt takes
   std::int64_t steps = 1000;
-  std::optional<double> duration;  ///< s; where given it sets steps = ceil(duration/dt)
-  std::int64_t frame_stride = 5;   ///< steps from frame to frame
-  bool single_precision = false;   ///< float32 instead of float64
+  std::optional<double> duration;   ///< s; where given it sets steps = ceil(duration/dt)
+  std::int64_t frame_stride = 5;    ///< steps from frame to frame
+  bool single_precision = false;    ///< float32 instead of float64
+  std::filesystem::path continued;  ///< trajectory.h5 whose run goes on; empty: from the start
   std::vector<BodyDescription> bodies;
 };
 
@@ -43,6 +45,7 @@ struct PlacedScene {
   std::vector<double> mass, volume;   ///< [P] kg, m³
   std::vector<std::int32_t> body;     ///< [P]
   std::vector<std::ptrdiff_t> first;  ///< [bodies + 1]: body b is first[b] … first[b + 1] − 1
+  std::optional<RunState> start;      ///< where an earlier run ended, in place of x and v
 
   std::ptrdiff_t particles() const { return static_cast<std::ptrdiff_t>(mass.size()); }
 };
@@ -53,7 +56,8 @@ struct PlacedScene {
 /// (overlap.hpp), and naming the body and the parameter where a law is not complete.
 PlacedScene place_scene(const SceneDescription& scene);
 
-/// A scene that can run: the engine and the state before the first step (F = I, C = 0).
+/// A scene that can run: the engine and the state before the first step (F = I, C = 0, unless the
+/// scene goes on from an earlier run).
 template <class T>
 struct Scene {
   kernels::Rollout<T> rollout;
@@ -67,10 +71,11 @@ Scene<T> build_scene(const SceneDescription& scene, const PlacedScene& placed);
 using FrameFunction =
     std::function<bool(double time, std::int64_t step, const ParticleState& state)>;
 
-/// Runs in the scene's precision, hands over the states 0, stride, 2 stride, … and returns the last
-/// state with all fields.
+/// Runs in the scene's precision, hands over the states 0, stride, 2 stride, … (of a run that goes
+/// on: its first one and those multiples) and returns the last state with all fields, and in *end,
+/// unless null, where it stands.
 ParticleState run_scene(const SceneDescription& scene, const PlacedScene& placed,
-                        FrameFields fields, const FrameFunction& on_frame);
+                        FrameFields fields, const FrameFunction& on_frame, RunPoint* end = nullptr);
 
 /// The whole trajectory in memory. `yaml` is stored as its scene.
 Trajectory run_scene(const SceneDescription& scene, FrameFields fields = {},

@@ -82,6 +82,10 @@ SceneSource read_scene(Section& config, bool with_laws) {
   source.with_laws_ = with_laws;
   Section scene = config.section("scene", "the grid, the time and the walls");
   source.settings_ = read_scene_settings(scene);
+  source.settings_.continued = scene.input_file("continue", std::string(),
+                                                "trajectory.h5 of an earlier run of this scene, "
+                                                "which goes on from its last state by steps or "
+                                                "duration");
   for (Section& section : config.list("bodies", "what moves in the scene", at_least(1))) {
     SceneSource::BodySource body;
     body.description = read_body(section, source.bodies_.size());

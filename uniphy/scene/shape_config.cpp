@@ -154,8 +154,18 @@ ShapeLoader read_cloud(Section& s) {
                                "volume of each particle before scaling, where the file has none");
   const bool in_place = s.boolean(
       "in_place", false, "keep the positions of the file, in place of center, rotation and size");
+  const bool undeformed = s.boolean(
+      "undeformed", false,
+      "with in_place: the positions of a trajectory are those of a body without strain or motion");
   return [=](BodyDescription* body) {
     body->cloud = std::make_shared<const ParticleCloud>(read_particles(file, frame));
+    if (in_place && body->cloud->of_trajectory && !undeformed) {
+      throw Error(
+          file.string() +
+          ": in_place: expected positions of a body at rest, found a trajectory, whose velocities "
+          "and strains would be lost; scene.continue goes on from its last state, undeformed: true "
+          "starts anew from its positions");
+    }
     if (volume > 0 && !body->cloud->volume.empty()) {
       throw Error(file.string() + ": expected /volume or particle_volume, found both");
     }

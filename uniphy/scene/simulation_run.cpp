@@ -10,6 +10,7 @@
 #include "uniphy/io/observation.hpp"
 #include "uniphy/report/plot.hpp"
 #include "uniphy/report/progress.hpp"
+#include "uniphy/scene/continued_run.hpp"
 #include "uniphy/scene/scene_warnings.hpp"
 
 namespace uniphy {
@@ -41,6 +42,23 @@ void record_metrics(const SceneDescription& scene, const PlacedScene& placed, Me
     metrics.set("particles_per_cell." + name, per_cell[b]);
     metrics.set("volume." + name, std::accumulate(first, last, 0.0));
   }
+}
+
+void go_on(const SceneDescription& scene, const SimulationOutput& output, const RunDirectory& out,
+           PlacedScene* placed) {
+  std::error_code ignored;
+  if (std::filesystem::equivalent(scene.continued, out.file("trajectory.h5"), ignored)) {
+    throw Error(fmt::format(
+        "scene.continue: expected a trajectory that this run does not replace, found {}; another "
+        "--out keeps both",
+        scene.continued.string()));
+  }
+  if (output.observation) {
+    throw Error(
+        "output.observation: expected a run from its start, for the first frame of an observation "
+        "is taken as undeformed, found scene.continue");
+  }
+  continue_run(scene.continued, out.config_yaml(), scene, placed);
 }
 
 /// Draws frames of a trajectory, evenly spread, its first and last one included.
@@ -107,7 +125,11 @@ SimulationOutput read_simulation_output(Section& config) {
 
 void simulate_into(const SceneDescription& scene, const SimulationOutput& output, RunDirectory& out,
                    Metrics& metrics) {
-  const PlacedScene placed = place_scene(scene);
+  PlacedScene placed = place_scene(scene);
+  if (!scene.continued.empty()) {
+    go_on(scene, output, out, &placed);
+    metrics.set("first_step", static_cast<double>(placed.start->point.step));
+  }
   if (output.observation && scene.bodies.size() != 1) {
     throw Error(fmt::format("output.observation: expected a scene of one body, found {}",
                             scene.bodies.size()));
@@ -125,20 +147,24 @@ void simulate_into(const SceneDescription& scene, const SimulationOutput& output
   TrajectoryWriter writer(out.file("trajectory.h5"), header, output.fields, output.gzip);
 
   Observation seen = begin_observation(placed.grid, scene.bodies.front().density, placed.volume);
+  const std::int64_t first = placed.start ? placed.start->point.step : 0;
   Progress progress("simulate", placed.steps);
   const auto start = std::chrono::steady_clock::now();
   ParticleState last;
+  RunPoint end;
   bool storing = false;  // what fails while a frame is written may leave a part of it
   try {
-    last = run_scene(scene, placed, output.fields,
-                     [&](double time, std::int64_t step, const ParticleState& state) {
-                       storing = true;
-                       writer.append(time, step, state);
-                       storing = false;
-                       if (output.observation) add_frame(seen, time, state.x);
-                       progress.update(step);
-                       return true;
-                     });
+    last = run_scene(
+        scene, placed, output.fields,
+        [&](double time, std::int64_t step, const ParticleState& state) {
+          storing = true;
+          writer.append(time, step, state);
+          storing = false;
+          if (output.observation) add_frame(seen, time, state.x);
+          progress.update(step - first);
+          return true;
+        },
+        &end);
   } catch (const std::exception& error) {
     progress.finish();
     if (!storing && writer.frames() > 0) keep_frames(writer, error.what(), output, out);
@@ -148,7 +174,7 @@ void simulate_into(const SceneDescription& scene, const SimulationOutput& output
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   progress.finish();
   metrics.set("frames", static_cast<double>(writer.frames()));
-  writer.finish(last);
+  writer.finish(last, &end);
   if (output.observation) write_observation(out.file("observation.h5"), seen);
   const double particle_steps =
       static_cast<double>(placed.particles()) * static_cast<double>(placed.steps);

@@ -82,7 +82,18 @@ std::ptrdiff_t Rollout<T>::run(ParticleState<T>& state, std::ptrdiff_t steps,
   LawSample<T> sample;
 
   RolloutEngine<T> engine(*this);
-  engine.load(state);
+  SortState<T> own;
+  SortState<T>& sort = options.sort != nullptr ? *options.sort : own;
+  const auto sort_now = [&] {
+    sort = {0, state.x};
+    engine.load(state);
+  };
+  if (sort.steps <= 0 || sort.steps >= kSortEvery) {
+    sort_now();
+  } else {
+    check_size("sort", sort.x, 3 * particles());
+    engine.load(state, 0, sort.x.data());
+  }
   std::ptrdiff_t done = 0;
   while (true) {
     if (frames && done % options.every == 0) {
@@ -91,22 +102,24 @@ std::ptrdiff_t Rollout<T>::run(ParticleState<T>& state, std::ptrdiff_t steps,
     }
     if (done == steps) break;
     call_between_steps();
-    if (done > 0 && done % kSortEvery == 0) {
+    if (sort.steps == kSortEvery) {
       engine.store(state);
-      engine.load(state);
+      sort_now();
     }
-    std::ptrdiff_t until = std::min(steps, (done / kSortEvery + 1) * kSortEvery);
+    std::ptrdiff_t until = std::min(steps, done + kSortEvery - sort.steps);
     if (frames) until = std::min(until, (done / options.every + 1) * options.every);
     const std::ptrdiff_t step = options.first_step + done;
     if (samples && options.sample_step(step)) {
       engine.advance_sampled(step, sample);
       options.on_sample(step, sample);
       ++done;
+      ++sort.steps;
       continue;
     }
     std::ptrdiff_t next = done + 1;
     while (next < until && !(samples && options.sample_step(options.first_step + next))) ++next;
     engine.advance(step, next - done);
+    sort.steps += next - done;
     done = next;
   }
   engine.store(state);

@@ -24,6 +24,14 @@ struct LawSample {
   std::vector<T> F_trial, F_proj, C, tau;
 };
 
+/// By which positions the particles are sorted, and since when. The order of summation, hence the
+/// bits, depends on it: a run that goes on from the last state of another gets its bits with this.
+template <class T>
+struct SortState {
+  std::ptrdiff_t steps = 0;  ///< since the particles were sorted; 0: they will be
+  std::vector<T> x;          ///< [P,3] m, where they were then; empty with steps = 0
+};
+
 template <class T>
 struct RunOptions {
   /// Called with the state before the first step and then after every `every` steps (0: never);
@@ -38,6 +46,8 @@ struct RunOptions {
 
   /// Number of the first step, for callbacks and messages.
   std::ptrdiff_t first_step = 0;
+  /// Where not null, the run goes on from *sort and leaves there where it ended.
+  SortState<T>* sort = nullptr;
 };
 
 /// What the backward pass needs of a forward one: checkpoints, about sqrt(steps) of them.

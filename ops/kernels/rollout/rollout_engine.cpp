@@ -48,7 +48,8 @@ int RolloutEngine<T>::threads() const {
 }
 
 template <class T>
-void RolloutEngine<T>::load(const ParticleState<T>& state, std::ptrdiff_t history) {
+void RolloutEngine<T>::load(const ParticleState<T>& state, std::ptrdiff_t history,
+                            const T* sort_x) {
   keep_history_ = history > 0;
   kept_steps_ = 0;
   state_stride_ = keep_history_ ? chunks() * std::ptrdiff_t(kStateChunkSize) : 0;
@@ -56,7 +57,7 @@ void RolloutEngine<T>::load(const ParticleState<T>& state, std::ptrdiff_t histor
   if (keep_history_) stresses_.resize(history * chunks() * kMatrixChunkSize);
   if (std::ptrdiff_t(records_.size()) < history) records_.resize(history);
 
-  order_.sort(state.x.data(), rollout_.grid().n);
+  order_.sort(sort_x != nullptr ? sort_x : state.x.data(), rollout_.grid().n);
   order_.load(rollout_.mass().data(), 1, mass_.data(), kChunk);
   order_.load(rollout_.volume().data(), 1, volume_.data(), kChunk);
   T* planes = states_.data();

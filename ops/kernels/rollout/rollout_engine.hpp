@@ -27,8 +27,8 @@ class RolloutEngine {
 
   /// Sorts the particles by cell and takes over their state. With history > 0 the next advance(),
   /// of at most that many steps, keeps every state, stress and grid for backward(); else states
-  /// are advanced in place.
-  void load(const ParticleState<T>& state, std::ptrdiff_t history = 0);
+  /// are advanced in place. sort_x [P,3]: what they are sorted by; null: state.x.
+  void load(const ParticleState<T>& state, std::ptrdiff_t history = 0, const T* sort_x = nullptr);
   /// Back to the user's order; vectors of the right size, empty ones are left out.
   void store(ParticleState<T>& state) const;
 

@@ -136,6 +136,45 @@ TEST(Trajectory, AnIncompleteOneSaysWhy) {
   EXPECT_EQ(hdf5::Reader(scratch.file("t.h5")).attribute_integer("/", "complete"), 0);
 }
 
+TEST(Trajectory, KeepsWhereItsRunStood) {
+  const testing::Scratch scratch;
+  Trajectory written = example(2, 4);
+  const auto error = [&] {
+    return testing::without_directory(
+        testing::error_of([&] { read_run_state(scratch.file("t.h5")); }), scratch.path());
+  };
+  write_trajectory(scratch.file("t.h5"), written);
+  EXPECT_FALSE(read_trajectory(scratch.file("t.h5")).end);
+  EXPECT_THAT(error(), HasSubstr("t.h5: /final: expected a last state that a run can go on from"));
+
+  written.end = RunPoint{47, 15, random_numbers(12, 9), "0123456789abcdef"};
+  write_trajectory(scratch.file("t.h5"), written);
+  const RunState state = read_run_state(scratch.file("t.h5"));
+  EXPECT_EQ(state.particles.v, written.last.v);
+  EXPECT_EQ(state.particles.memory, written.last.memory);
+  EXPECT_EQ(state.point.step, 47);
+  EXPECT_EQ(state.point.steps_sorted, 15);
+  EXPECT_EQ(state.point.sorted_x, written.end->sorted_x);
+  EXPECT_EQ(state.point.scene_hash, "0123456789abcdef");
+  EXPECT_EQ(state.scene, written.scene);
+  EXPECT_EQ(read_trajectory(scratch.file("t.h5")).end->step, 47);
+
+  // One bit of the last velocities.
+  std::string bytes = read_text_file(scratch.file("t.h5"));
+  const std::string number(reinterpret_cast<const char*>(&written.last.v[5]), sizeof(double));
+  const std::size_t at = bytes.find(number);
+  ASSERT_NE(at, std::string::npos);
+  bytes[at] = static_cast<char>(bytes[at] ^ 1);
+  scratch.write("t.h5", bytes);
+  EXPECT_THAT(error(), HasSubstr("t.h5: /final: expected the checksum "));
+
+  written.failure = "particle 2 left the grid";
+  write_trajectory(scratch.file("t.h5"), written);
+  EXPECT_EQ(error(),
+            "t.h5: expected a complete trajectory, found one whose run failed: particle 2 left the "
+            "grid");
+}
+
 TEST(TrajectoryWriter, RefusesWhatDoesNotFit) {
   const testing::Scratch scratch;
   const auto message = [&](auto function) {

@@ -160,7 +160,7 @@ TEST(SimulationRun, FramesOfAFailedRunAreUsedWithAWarning) {
   ASSERT_EQ(run_simulate(scratch, kBlowUp, &err), 1);
   ::testing::internal::CaptureStderr();
   read_job("[{shape: {type: particles, file: " + scratch.file("out/trajectory.h5").string() +
-           ", frame: 1, in_place: true}, law: {type: water, lambda: 1e4}}]");
+           ", frame: 1, in_place: true, undeformed: true}, law: {type: water, lambda: 1e4}}]");
   EXPECT_THAT(::testing::internal::GetCapturedStderr(),
               HasSubstr("trajectory.h5: is of a run that failed: particle 4 at"));
 }

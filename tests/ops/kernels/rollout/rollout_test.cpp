@@ -256,6 +256,36 @@ TYPED_TEST(RolloutOfType, FramesAndSamplesDoNotChangeTheRun) {
   EXPECT_EQ(samples, (std::vector<std::ptrdiff_t>{100, 109, 118, 127, 136, 145, 154, 163}));
 }
 
+// Wherever it is cut, whether or not the particles have just been sorted.
+TYPED_TEST(RolloutOfType, GoesOnToTheSameBits) {
+  using T = TypeParam;
+  TwoBodies<T> scene(300);
+  scene.chi = 1e4;
+  const Rollout<T> rollout = scene.rollout();
+  ParticleState<T> whole = scene.state;
+  rollout.run(whole, 100);
+  for (const std::vector<int>& parts :
+       {std::vector<int>{32, 68}, {13, 87}, {31, 1, 68}, {40, 50, 10}, {0, 1, 0, 99}}) {
+    ParticleState<T> state = scene.state;
+    RunOptions<T> options;
+    SortState<T> sort;
+    options.sort = &sort;
+    for (const int steps : parts) rollout.run(state, steps, options);
+    EXPECT_EQ(state.x, whole.x);
+    EXPECT_EQ(state.v, whole.v);
+    EXPECT_EQ(state.C, whole.C);
+    EXPECT_EQ(state.F, whole.F);
+    EXPECT_EQ(state.memory, whole.memory);
+    EXPECT_EQ(sort.steps, 4);
+  }
+  ParticleState<T> state = scene.state;
+  RunOptions<T> options;
+  SortState<T> sort{5, {}};
+  options.sort = &sort;
+  EXPECT_THAT(testing::error_of([&] { rollout.run(state, 1, options); }),
+              HasSubstr("expected 900 numbers in sort, found 0"));
+}
+
 // What the law remembers goes along when particles are sorted again, and stays with its body; a
 // state without memory begins at 0, and one that is handed on goes on to the same bits.
 TYPED_TEST(RolloutOfType, CarriesTheMemoryOfALaw) {
