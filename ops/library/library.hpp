@@ -17,8 +17,10 @@
 // Three groups of arguments come up again:
 //
 // law, parameters: an analytic law by name ("elastic", "newtonian", "plasticine", "sand",
-// "non_newtonian", "fixed_corotated", "water") and its parameters [N] in this order, as far as the
-// law has them: mu (Pa; newtonian: Pa s), lambda (Pa), tau_y (Pa), theta (rad), eta (Pa s).
+// "non_newtonian", "fixed_corotated", "water", "volume_corrected_sand", "mooney_rivlin", "carreau",
+// "cohesive_sand", "herschel_bulkley") and its parameters [N] in this order, as far as the law has
+// them: mu (Pa; newtonian: Pa s), lambda (Pa), tau_y (Pa), theta (rad), eta (Pa s;
+// herschel_bulkley: Pa sⁿ), c1, c2 (Pa), eta_inf (Pa s), kappa (s), n, cohesion.
 //
 // form, activation, projection_widths, projection, stress_widths, stress: the networks of a learned
 // law (attributes of model.h5), keywords. A network is one tensor [numbers], the weight [out, in],
