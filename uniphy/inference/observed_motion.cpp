@@ -11,7 +11,7 @@
 #include "ops/kernels/base/error.hpp"
 #include "ops/kernels/rollout/rollout.hpp"
 #include "uniphy/inference/observed_noise.hpp"
-#include "uniphy/scene/grid_memory.hpp"
+#include "uniphy/scene/memory_check.hpp"
 
 namespace uniphy {
 namespace {

@@ -10,7 +10,7 @@
 
 #include "ops/kernels/base/error.hpp"
 #include "uniphy/scene/continued_run.hpp"
-#include "uniphy/scene/grid_memory.hpp"
+#include "uniphy/scene/memory_check.hpp"
 #include "uniphy/scene/overlap.hpp"
 
 namespace uniphy {
@@ -191,6 +191,8 @@ PlacedScene place_scene(const SceneDescription& scene) {
     all.push_back(place_body(body));
     if (body.on_floor) put_on_floor(scene.grid, body, all.back());
     const BodyParticles& particles = all.back();
+    check_particle_memory(fmt::format("bodies.{}.filling", b),
+                          placed.particles() + static_cast<std::ptrdiff_t>(particles.x.size()));
     check_extent(body, particles, scene.grid);
     stable = std::min(stable, stable_step_of(scene, body, particles));
     for (const Vector3d& x : particles.x) placed.x.insert(placed.x.end(), x.data(), x.data() + 3);

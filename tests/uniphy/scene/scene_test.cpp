@@ -313,5 +313,18 @@ TEST(PlaceScene, RefusesAGridThatDoesNotFitIntoMemory) {
   EXPECT_EQ(testing::error_with_limit(RLIMIT_AS, rlim_t{4} << 30, [&] { place_scene(scene); }), "");
 }
 
+// All bodies together, before their states are taken.
+TEST(PlaceScene, RefusesParticlesThatDoNotFitIntoMemory) {
+  SceneDescription scene = one(ball({0.3, 0.5, 0.5}));
+  scene.bodies.push_back(ball({0.7, 0.5, 0.5}));
+  for (BodyDescription& body : scene.bodies) body.filling.count = 500000;
+  scene.bodies[1].name = "other";
+  EXPECT_THAT(testing::error_with_limit(RLIMIT_AS, rlim_t{1} << 30, [&] { place_scene(scene); }),
+              AllOf(HasSubstr("bodies.1.filling: "), HasSubstr("particles take 1.28 GB"),
+                    HasSubstr("expected at most 1.07 GB")));
+  for (BodyDescription& body : scene.bodies) body.filling.count = 50000;
+  EXPECT_EQ(testing::error_with_limit(RLIMIT_AS, rlim_t{1} << 30, [&] { place_scene(scene); }), "");
+}
+
 }  // namespace
 }  // namespace uniphy

@@ -10,4 +10,7 @@ namespace uniphy {
 /// before they are taken.
 void check_grid_memory(const std::string& key, int n, std::size_t bytes_of_a_number);
 
+/// The same for the particles of a simulation, all bodies together.
+void check_particle_memory(const std::string& key, std::ptrdiff_t particles);
+
 }  // namespace uniphy
