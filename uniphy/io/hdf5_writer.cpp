@@ -109,6 +109,7 @@ struct Writer::Impl {
         H5Pset_shuffle(storage);
         H5Pset_deflate(storage, static_cast<unsigned>(std::min(info.gzip, 9)));
       }
+      H5Pset_fletcher32(storage);  // a bit that flips on the disk is an error when it is read
     }
     Handle set =
         dataset(H5Dcreate2(file, name.c_str(), type, space, H5P_DEFAULT, storage, H5P_DEFAULT));
@@ -156,7 +157,7 @@ void Writer::write(const std::string& name, const T* data, const Shape& shape, c
   std::vector<hsize_t> chunk;
   std::int64_t count = 1;
   for (const std::int64_t extent : shape) count *= extent;
-  if (info.gzip > 0 && count > 0 && !shape.empty()) {
+  if (count > 0 && !shape.empty()) {  // chunks are what has a checksum
     chunk = size;
     chunk[0] =
         std::min(size[0], chunk_rows(count / shape[0] * static_cast<std::int64_t>(sizeof(T))));

@@ -6,9 +6,12 @@
 #include <unistd.h>
 
 #include <cmath>
+#include <fstream>
+#include <iterator>
 #include <limits>
 #include <numeric>
 
+#include "tests/support/error_of.hpp"
 #include "tests/uniphy/support/scratch.hpp"
 #include "uniphy/io/atomic_file.hpp"
 
@@ -148,6 +151,39 @@ TEST(Hdf5, TheSameDataMakeTheSameBytes) {
   const std::string first = bytes("a.h5");
   ::usleep(1100000);  // HDF5 stores times in whole seconds
   EXPECT_TRUE(bytes("b.h5") == first);
+}
+
+// Files that another stage reads: model.h5, dataset.h5, latent.h5, trajectory.h5, observation.h5.
+TYPED_TEST(Hdf5RoundTrip, AFlippedBitOfTheNumbersIsAnError) {
+  const testing::Scratch scratch;
+  std::vector<TypeParam> data(3000);
+  std::iota(data.begin(), data.end(), TypeParam(1));
+  data[1234] = TypeParam(123456789);
+  Writer writer(scratch.file("a.h5"));
+  writer.write("numbers", data, {1000, 3}, {"m", "numbers"});
+  writer.template extendible<TypeParam>("rows", {3}, {"m", "appended"});
+  writer.append("rows", data);
+  writer.commit();
+
+  std::ifstream in(scratch.file("a.h5"), std::ios::binary);
+  const std::string good((std::istreambuf_iterator<char>(in)), {});
+  const std::string number(reinterpret_cast<const char*>(&data[1234]), sizeof(TypeParam));
+  int places = 0;
+  for (std::size_t at = good.find(number); at != std::string::npos;
+       at = good.find(number, at + 1)) {
+    std::string bad = good;
+    bad[at] ^= 4;
+    scratch.write("b.h5", bad);
+    const std::string message = testing::error_of([&] {
+      const Reader reader(scratch.file("b.h5"));
+      reader.read<TypeParam>("numbers", {1000, 3});
+      reader.read<TypeParam>("rows", {-1, 3});
+    });
+    EXPECT_THAT(message, ::testing::HasSubstr("cannot be read: ")) << at;
+    EXPECT_THAT(message, ::testing::HasSubstr("hecksum")) << at;
+    ++places;
+  }
+  EXPECT_EQ(places, 2);
 }
 
 TEST(Hdf5, AnyValuesMayHoldNan) {

@@ -159,14 +159,21 @@ TEST(Trajectory, KeepsWhereItsRunStood) {
   EXPECT_EQ(state.scene, written.scene);
   EXPECT_EQ(read_trajectory(scratch.file("t.h5")).end->step, 47);
 
-  // One bit of the last velocities.
-  std::string bytes = read_text_file(scratch.file("t.h5"));
-  const std::string number(reinterpret_cast<const char*>(&written.last.v[5]), sizeof(double));
-  const std::size_t at = bytes.find(number);
-  ASSERT_NE(at, std::string::npos);
-  bytes[at] = static_cast<char>(bytes[at] ^ 1);
-  scratch.write("t.h5", bytes);
-  EXPECT_THAT(error(), HasSubstr("t.h5: /final: expected the checksum "));
+  // One bit of the last velocities, and one of the attributes, which HDF5 gives a checksum of its
+  // own: it then reads none.
+  const std::string good = read_text_file(scratch.file("t.h5"));
+  const auto flip = [&](const std::string& text) {
+    const std::size_t at = good.find(text);
+    ASSERT_NE(at, std::string::npos);
+    std::string bytes = good;
+    bytes[at] = static_cast<char>(bytes[at] ^ 1);
+    scratch.write("t.h5", bytes);
+  };
+  flip({reinterpret_cast<const char*>(&written.last.v[5]), sizeof(double)});
+  EXPECT_THAT(error(), HasSubstr("t.h5: /final/v: cannot be read: "));
+  scratch.write("t.h5", good);
+  flip(hdf5::Reader(scratch.file("t.h5")).attribute_text("/final", "checksum"));
+  EXPECT_THAT(error(), HasSubstr("t.h5: /final: expected "));
 
   written.failure = "particle 2 left the grid";
   write_trajectory(scratch.file("t.h5"), written);
