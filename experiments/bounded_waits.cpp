@@ -2,7 +2,7 @@
 //
 // libgomp spins 300,000 times, some 15 ms, before it sleeps. On a machine that runs anything else
 // besides, the waiting thread then takes the time slice of the one it waits for, again and again:
-// 3000 steps of uniphy_train on two threads of two busy cores took 24 to 52 s, for 4 s on one. The
+// 1000 steps of uniphy_train on two threads, beside two busy loops on two cores, took 59 s. The
 // number can only be set by the environment, and only before libgomp is loaded. So a program that
 // finds it unset starts itself anew with it, before the constructors of its libraries have run
 // (20 ms with LibTorch).
@@ -17,8 +17,11 @@
 
 namespace {
 
-/// Some 5 µs: the threads of a short loop do not sleep, and a busy machine loses no time slice.
-char kSpins[] = "GOMP_SPINCOUNT=100";
+/// Some 1 ms: more than the threads of a training step wait for each other. Of 2000 steps on a quiet
+/// machine and 1000 beside two busy loops, in seconds: 100 spins 6.0 and 5.2 (a short loop sleeps in
+/// every step), 5000 4.5 and 7.3, 10,000 4.3 and 8.6, 20,000 4.0 and 11.3, libgomp's 300,000 4.0 and
+/// 59.5; one thread 5.9 and 6.5.
+char kSpins[] = "GOMP_SPINCOUNT=20000";
 
 bool sets(const char* entry, const char* name) {
   const std::size_t length = std::strlen(name);

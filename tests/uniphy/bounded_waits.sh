@@ -13,7 +13,7 @@ fail() {
 }
 for binary; do
   found=$(spins "$binary")
-  [ "$found" = 100 ] || fail "100 spins" "$found"
+  [ "$found" = 20000 ] || fail "20000 spins" "$found"
   found=$(GOMP_SPINCOUNT=7 spins "$binary")
   [ "$found" = 7 ] || fail "the 7 spins of its user" "$found"
   found=$(OMP_WAIT_POLICY=active spins "$binary")
