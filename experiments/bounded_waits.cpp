@@ -17,10 +17,10 @@
 
 namespace {
 
-/// Some 1 ms: more than the threads of a training step wait for each other. Of 2000 steps on a quiet
-/// machine and 1000 beside two busy loops, in seconds: 100 spins 6.0 and 5.2 (a short loop sleeps in
-/// every step), 5000 4.5 and 7.3, 10,000 4.3 and 8.6, 20,000 4.0 and 11.3, libgomp's 300,000 4.0 and
-/// 59.5; one thread 5.9 and 6.5.
+/// Some 1 ms: more than the threads of a training step wait for each other. Of 2000 steps on a
+/// quiet machine and 1000 beside two busy loops, in seconds: 100 spins 6.0 and 5.2 (a short loop
+/// sleeps in every step), 5000 4.5 and 7.3, 10,000 4.3 and 8.6, 20,000 4.0 and 11.3, libgomp's
+/// 300,000 4.0 and 59.5; one thread 5.9 and 6.5.
 char kSpins[] = "GOMP_SPINCOUNT=20000";
 
 bool sets(const char* entry, const char* name) {
