@@ -19,7 +19,7 @@ struct ParticleCloud {
   std::vector<double> volume;
   bool of_trajectory = false;  ///< positions of particles that were deformed and in motion
   /// Of a trajectory whose run failed (trajectory.hpp): why; else empty.
-  std::string failure;
+  std::string failure = {};
 
   Bounds bounds() const { return bounds_of(x); }
 };

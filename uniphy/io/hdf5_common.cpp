@@ -34,6 +34,13 @@ std::string hdf5_reason() {
       return 1;
     }
     if (text.empty()) text = found;
+    // Where a checksum fails, the deepest message says so in HDF5 1.10 and that a filter failed in
+    // 1.14.
+    for (const char* sign : {"checksum", "filter"}) {
+      if (found.find(sign) == found.npos) continue;
+      text = "its checksum is wrong, the file is damaged (" + found + ")";
+      return 1;
+    }
     return 0;
   };
   H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, visit, &reason);

@@ -10,7 +10,7 @@ namespace uniphy::kernels {
 /// (LawKernel::has_memory; empty: 0 of every particle). In files, absent fields are empty.
 template <class T>
 struct ParticleState {
-  std::vector<T> x, v, C, F, memory;
+  std::vector<T> x, v, C, F, memory = {};
 
   std::ptrdiff_t size() const { return static_cast<std::ptrdiff_t>(x.size() / 3); }
   /// The state before the first step: F = I, C = 0, no memory.

@@ -179,8 +179,7 @@ TYPED_TEST(Hdf5RoundTrip, AFlippedBitOfTheNumbersIsAnError) {
       reader.read<TypeParam>("numbers", {1000, 3});
       reader.read<TypeParam>("rows", {-1, 3});
     });
-    EXPECT_THAT(message, ::testing::HasSubstr("cannot be read: ")) << at;
-    EXPECT_THAT(message, ::testing::HasSubstr("hecksum")) << at;
+    EXPECT_THAT(message, ::testing::HasSubstr("cannot be read: its checksum is wrong")) << at;
     ++places;
   }
   EXPECT_EQ(places, 2);

@@ -200,8 +200,7 @@ TEST(PlaceScene, PutsABodyOnTheFloor) {
         least = std::min(least, placed.x[3 * p + axis]);
         most = std::max(most, placed.x[3 * p + axis]);
       }
-      if (sign < 0) EXPECT_NEAR(least, 0.1 + 0.0125, 1e-12) << axis;
-      if (sign > 0) EXPECT_NEAR(most, 0.9 - 0.0125, 1e-12) << axis;
+      EXPECT_NEAR(sign < 0 ? least : most, sign < 0 ? 0.1 + 0.0125 : 0.9 - 0.0125, 1e-12) << axis;
     }
   }
   SceneDescription weightless = one(body);

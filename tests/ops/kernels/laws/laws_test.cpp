@@ -129,7 +129,9 @@ TEST_P(LawsOnIsa, GradientsMatchCentralDifferences) {
       EXPECT_LE(e.F, 1e-6) << where;
       EXPECT_LE(e.C, check.linear_in_C ? 1e-8 : 1e-7) << where;
       EXPECT_LE(e.parameters, 1e-6) << where;
-      if (!is_clamped(c)) EXPECT_LE(e.memory, 1e-6) << where;
+      if (!is_clamped(c)) {
+        EXPECT_LE(e.memory, 1e-6) << where;
+      }
     }
   }
 }
