@@ -7,6 +7,7 @@
 
 #include "ops/kernels/base/error.hpp"
 #include "ops/kernels/base/hash.hpp"
+#include "ops/kernels/laws/law_parameters.hpp"
 #include "uniphy/config/document.hpp"
 
 namespace uniphy {
@@ -20,7 +21,7 @@ void add_network(const kernels::MlpWeights& network, kernels::Hash& hash) {
 
 void add_law(const kernels::LawDescription& law, kernels::Hash& hash) {
   hash.add(kernels::law_name(law.id));
-  hash.add(std::vector<double>{law.mu, law.lambda, law.tau_y, law.theta, law.eta}).add(law.z);
+  hash.add(kernels::parameter_values(law));  // of a learned law: z
   if (law.weights == nullptr) return;
   hash.add(kernels::form_name(law.weights->form));
   hash.add(kernels::activation_name(law.weights->activation));

@@ -41,8 +41,8 @@ std::optional<std::string> time_step_warning(const kernels::LawDescription& law,
 /// worst codes of held-out materials are off themselves.
 inline constexpr double kStepOfFlow = 1.1;
 /// Any fitted law: the transfer between particles and grid damps at every step. The rebound of an
-/// elastic cube is 0.485, 0.479, 0.471, 0.463 m at 4e-4, 2e-4, 1e-4, 5e-5 s: a halving is worth at
-/// most 1.7 %, and more than one is seen.
+/// elastic cube is 0.514, 0.496, 0.476, 0.459 m at 4e-4, 2e-4, 1e-4, 5e-5 s (README): a halving is
+/// worth up to 4 %, and more than one is seen.
 inline constexpr double kStepOfFit = 2.0;
 
 }  // namespace uniphy

@@ -7,6 +7,7 @@
 
 #include <fstream>
 
+#include "ops/kernels/laws/law_parameters.hpp"
 #include "tests/uniphy/support/scratch.hpp"
 #include "uniphy/scene/scene_config.hpp"
 #include "uniphy/scene/simulation_run.hpp"
@@ -152,6 +153,23 @@ TEST_F(ContinuedRun, IsRefusedWhereAFileOfTheSceneHasChanged) {
   cloud(0.5);  // larger bounds, hence smaller particles
   EXPECT_THAT(error(yaml, {going_on("first")}),
               HasSubstr("expected the masses, volumes and laws that its run began with"));
+}
+
+// A fitted law comes from a file, so that no key of the configuration shows a change.
+TEST(SceneHash, SeesEveryParameterOfEveryLaw) {
+  for (int i = 0; i < kernels::kAnalyticLaws; ++i) {
+    SceneDescription scene;
+    scene.bodies.emplace_back();
+    kernels::LawDescription& law = scene.bodies[0].law;
+    law.id = static_cast<kernels::LawId>(i);
+    const std::string before = scene_hash(scene, {});
+    for (const kernels::LawParameter& p : kernels::law_parameters(law.id)) {
+      law.*p.member = 0.5;
+      EXPECT_NE(scene_hash(scene, {}), before) << kernels::law_name(law.id) << " " << p.name;
+      law.*p.member = 0;
+    }
+    EXPECT_EQ(scene_hash(scene, {}), before);
+  }
 }
 
 TEST_F(ContinuedRun, IsRefusedFromTheFrameOfATrajectory) {
