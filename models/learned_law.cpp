@@ -57,8 +57,11 @@ ops::LearnedNetworks random_networks(const LearnedLawOptions& options,
     const auto caps = ops::layers_of(n.projection), moduli = ops::layers_of(n.stress);
     if (!options.state_caps) caps.front().weight.narrow(1, 0, shape.projection_in).zero_();
     if (!options.state_moduli) moduli.front().weight.narrow(1, 0, shape.stress_in).zero_();
-    // Between the materials' exponents, and off γ = 0, where the derivative to γ vanishes.
-    moduli.back().bias.narrow(0, 5, 2).fill_(1);
+    // Between the materials' exponents, and off γ = 0, where the derivative to γ vanishes. The two
+    // strain measures start apart.
+    for (const auto k : {kernels::kShearExponent, kernels::kVolumeGamma})
+      moduli.back().bias.select(0, k).fill_(1);
+    moduli.back().bias.select(0, kernels::kSecondExponent).fill_(-1);
   }
   return n;
 }
@@ -94,17 +97,17 @@ LearnedLaw LearnedLawImpl::frozen() const {
   return LearnedLaw(std::shared_ptr<LearnedLawImpl>(new LearnedLawImpl(std::move(n), false)));
 }
 
-Tensor LearnedLawImpl::project(const Tensor& F, const Tensor& z) const {
-  return ops::learned_project(networks_, F, z);
+Tensor LearnedLawImpl::project(const Tensor& F, const Tensor& z, double dt) const {
+  return ops::learned_project(networks_, F, z, dt);
 }
 
 Tensor LearnedLawImpl::stress(const Tensor& F_proj, const Tensor& C, const Tensor& z) const {
   return ops::learned_stress(networks_, F_proj, C, z);
 }
 
-ops::LawOutput LearnedLawImpl::evaluate(const Tensor& F_trial, const Tensor& C,
-                                        const Tensor& z) const {
-  return ops::learned_law(networks_, F_trial, C, z);
+ops::LawOutput LearnedLawImpl::evaluate(const Tensor& F_trial, const Tensor& C, const Tensor& z,
+                                        double dt) const {
+  return ops::learned_law(networks_, F_trial, C, z, dt);
 }
 
 std::int64_t LearnedLawImpl::parameter_count() const {

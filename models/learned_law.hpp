@@ -47,13 +47,14 @@ class LearnedLawImpl : public torch::nn::Module {
   /// for those of the weights.
   LearnedLaw frozen() const;
 
-  /// F, F_proj, C [P, 3, 3] (1, 1, 1/s), z [Z] → [P, 3, 3] (1, Pa), through the ops of
+  /// F, F_proj, C [P, 3, 3] (1, 1, 1/s), z [Z], dt in s → [P, 3, 3] (1, Pa), through the ops of
   /// ops/learned/learned_law.hpp. evaluate is both in one pass.
-  torch::Tensor project(const torch::Tensor& F, const torch::Tensor& z) const;
+  torch::Tensor project(const torch::Tensor& F, const torch::Tensor& z,
+                        double dt = kernels::kFlowStep) const;
   torch::Tensor stress(const torch::Tensor& F_proj, const torch::Tensor& C,
                        const torch::Tensor& z) const;
   ops::LawOutput evaluate(const torch::Tensor& F_trial, const torch::Tensor& C,
-                          const torch::Tensor& z) const;
+                          const torch::Tensor& z, double dt = kernels::kFlowStep) const;
 
   kernels::LawForm form() const { return networks_.form; }
   kernels::Activation activation() const { return networks_.activation; }

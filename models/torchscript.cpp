@@ -110,7 +110,7 @@ void save_script_law(const fs::path& file, const kernels::LearnedLawWeights& wei
       {"parameter_units", kScriptParameterUnits},
       {"methods",
        {{"code_of", "material (str) -> z [Z] of its first training trajectory"},
-        {"project", "F [P, 3, 3], z [Z] or [P, Z] -> F_proj [P, 3, 3]"},
+        {"project", "F [P, 3, 3], z [Z] or [P, Z], dt (s, of the time step) -> F_proj [P, 3, 3]"},
         {"stress",
          "F_proj [P, 3, 3], C [P, 3, 3] in 1/s, z -> Kirchhoff stress [P, 3, 3] in Pa"}}}};
   // To memory first: LibTorch's own file writer ends the program where the disk is full.

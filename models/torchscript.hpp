@@ -5,12 +5,13 @@
 //   python3 -c "import torch; m = torch.jit.load('law.pt'); z = m.code_of('sand')
 //   F = torch.eye(3)[None].requires_grad_(); m.project(F, z).sum().backward(); print(F.grad)"
 //
-//   methods     project(F, z) → F_proj and stress(F_proj, C, z) → tau; F, F_proj, C [P, 3, 3],
-//               P ≥ 0, z [latent_size] or [P, latent_size], float32 or float64, finite; anything
-//               else is an error that names the argument. Computed in `dtype`, answered in the
-//               dtype of F.
-//               code_of(material) → z [latent_size] of the first training trajectory of a material
-//   attributes  format = "uniphy-torchscript-law", version = 2, form, activation, latent_size,
+//   methods     project(F, z, dt = 2e-4) → F_proj, dt the time step (s) that a viscoplastic law
+//               depends on (the published form does not), and stress(F_proj, C, z) → tau; F,
+//               F_proj, C [P, 3, 3], P ≥ 0, z [latent_size] or [P, latent_size], float32 or
+//               float64, finite; anything else is an error that names the argument. Computed in
+//               `dtype`, answered in the dtype of F. code_of(material) → z [latent_size] of the
+//               first training trajectory of a material
+//   attributes  format = "uniphy-torchscript-law", version = 3, form, activation, latent_size,
 //               dtype = "float32" | "float64", units = "F: 1, C: 1/s, z: 1, tau: Pa",
 //               materials [N] names of the laws behind the training codes,
 //               parameter_names and parameter_units [5] of the columns of material_parameters,
@@ -47,7 +48,7 @@
 namespace uniphy::models {
 
 inline constexpr const char* kScriptFormat = "uniphy-torchscript-law";
-inline constexpr std::int64_t kScriptVersion = 2;
+inline constexpr std::int64_t kScriptVersion = 3;
 inline constexpr const char* kScriptUnits = "F: 1, C: 1/s, z: 1, tau: Pa";
 
 /// The columns of material_parameters; a newtonian law's mu is in Pa s.
@@ -88,7 +89,8 @@ struct ScriptLaw {
   std::int64_t latent_size;
   torch::Dtype dtype;
 
-  torch::Tensor project(const torch::Tensor& F, const torch::Tensor& z) const;
+  torch::Tensor project(const torch::Tensor& F, const torch::Tensor& z,
+                        double dt = kernels::kFlowStep) const;
   torch::Tensor stress(const torch::Tensor& F_proj, const torch::Tensor& C,
                        const torch::Tensor& z) const;
   torch::Tensor code_of(const std::string& material) const;

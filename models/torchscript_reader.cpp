@@ -187,14 +187,14 @@ ScriptLaw load_script_law(const fs::path& file, std::optional<torch::Dtype> dtyp
   check_network(file, module, "stress", law.dtype, shape.stress_in + law.latent_size,
                 shape.stress_out);
   check_codes(file, attributes, law.dtype, law.latent_size);
-  check_method(file, module, "project", 2);
+  check_method(file, module, "project", 3);
   check_method(file, module, "stress", 3);
   check_method(file, module, "code_of", 1);
   return law;
 }
 
-Tensor ScriptLaw::project(const Tensor& F, const Tensor& z) const {
-  return module.run_method("project", F, z).toTensor();
+Tensor ScriptLaw::project(const Tensor& F, const Tensor& z, double dt) const {
+  return module.run_method("project", F, z, dt).toTensor();
 }
 
 Tensor ScriptLaw::stress(const Tensor& F_proj, const Tensor& C, const Tensor& z) const {

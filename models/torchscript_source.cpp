@@ -6,6 +6,7 @@
 
 #include "models/script_text.hpp"
 #include "ops/kernels/base/error.hpp"
+#include "ops/kernels/learned/power_law.hpp"
 #include "ops/kernels/spectral/limits.hpp"
 
 namespace uniphy::models {
@@ -77,6 +78,11 @@ std::map<std::string, double> script_constants(bool single_precision) {
           {"SINH_LIMIT", kernels::kSinhLimit},
           {"LEAST_VISCOSITY", kernels::kLeastViscosity},
           {"EXPONENT_LIMIT", kernels::kExponentLimit},
+          {"FLOW_STEP", kernels::kFlowStep},
+          {"FLOW_EXCESS", kernels::kFlowExcess},
+          {"FLOW_POWER_LIMIT", kernels::kFlowPowerLimit},
+          {"RATE_SCALE_LIMIT", kernels::kRateScaleLimit},
+          {"RATE_EXPONENT_LIMIT", kernels::kRateExponentLimit},
           {"ARGUMENT_LIMIT", kernels::kArgumentLimit},
           {"FLUID_CAP", kernels::kFluidCap},
           {"MINIMUM_STRETCH", kernels::kMinimumStretch},
@@ -85,6 +91,8 @@ std::map<std::string, double> script_constants(bool single_precision) {
           {"EPSILON", epsilon},
           {"TINY", tiny}};
 }
+
+static_assert(kernels::kFlowStep == 2e-4, "the default of project's dt in models/script");
 
 std::string script_source(const kernels::LearnedLawWeights& weights, bool single_precision) {
   std::string text = methods(kLawScript);

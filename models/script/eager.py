@@ -24,8 +24,13 @@ class Eager(torch.nn.Module):
     TIME_SCALE: float
     SMOOTHING: float
     SINH_LIMIT: float
+    FLOW_STEP: float
+    FLOW_EXCESS: float  # ops/kernels/learned/power_law.hpp
     LEAST_VISCOSITY: float
+    FLOW_POWER_LIMIT: float
     EXPONENT_LIMIT: float
+    RATE_SCALE_LIMIT: float
+    RATE_EXPONENT_LIMIT: float
     FLUID_CAP: float
     ARGUMENT_LIMIT: float  # these three: ops/kernels/spectral/limits.hpp
     MINIMUM_STRETCH: float

@@ -29,11 +29,34 @@ class Isotropic(Law):
         root2 = (w * w).sum(1) + self.SMOOTHING * self.SMOOTHING
         return w, t / e, torch.sqrt(root2) - self.SMOOTHING, (w * w * w).sum(1) / root2
 
-    def sinh_of(self, x: Tensor) -> Tensor:
-        return torch.sinh(torch.clamp(x, min=-self.SINH_LIMIT, max=self.SINH_LIMIT))
+    def bounded(self, x: Tensor, limit: float) -> Tensor:
+        return torch.clamp(x, min=-limit, max=limit)
 
-    def exponent_of(self, x: Tensor) -> Tensor:
-        return torch.clamp(x, min=-self.EXPONENT_LIMIT, max=self.EXPONENT_LIMIT)
+    def sinh_of(self, x: Tensor) -> Tensor:
+        return torch.sinh(self.bounded(x, self.SINH_LIMIT))
+
+    # What stays of an excess x over a cap: kept_excess of ops/kernels/learned/return_caps.hpp. Its
+    # share exp(w) solves log(e^w + A e^(p w)) = 0; the last step of Newton's method carries the
+    # derivative.
+    def kept_excess(self, x: Tensor, v: Tensor, factor: Tensor, p: Tensor) -> Tensor:
+        powered = (v > self.TINY) & (x > self.TINY) & (p != 1.0)
+        one = torch.ones_like(x)
+        excess = torch.where(powered, x, one)
+        flow = torch.where(powered, v, one)
+        log_A = (p - 1.0) * (torch.log(excess / self.FLOW_EXCESS) + torch.log1p(flow)) + (
+            torch.log(factor) - p * torch.log(flow))
+        p0 = p.detach()
+        w = torch.clamp(-log_A.detach() / p0, max=0.0)
+        for step in range(8):
+            a = torch.exp(w)
+            b = torch.exp(p0 * w + log_A.detach())
+            w = torch.clamp(w - torch.log(a + b) * (a + b) / (a + p0 * b), max=0.0)
+        a = torch.exp(w)
+        b = torch.exp(p0 * w + log_A.detach())
+        total = torch.log(a + torch.exp(p * w + log_A))
+        share = torch.exp(w - total * ((a + b) / (a + p0 * b)))
+        linear = torch.clamp(v / factor, min=self.LEAST_VISCOSITY)
+        return torch.where(powered, excess * share, x * linear / (1.0 + linear))
 
     # sinh(y)/y: below 1/2 by its series, whose terms reach 1e-16 there.
     def sinhc(self, y: Tensor) -> Tensor:
@@ -87,7 +110,8 @@ class Isotropic(Law):
         M = self.beside_diagonal(s + a, s - a)
         return torch.matmul(U, torch.matmul(M, V.transpose(1, 2)))
 
-    def project(self, F: Tensor, z: Tensor) -> Tensor:
+    def project(self, F: Tensor, z: Tensor, dt: float = 2e-4) -> Tensor:
+        self.check_step(dt)
         f = self.matrices("F", F, -1)
         rows = self.latent(z, f.size(0))
         U, sigma, V = self.spectral(f)
@@ -111,13 +135,20 @@ class Isotropic(Law):
         over_t = t > c2
         one = torch.ones_like(t)
         stretch = torch.clamp(sigma, min=self.MINIMUM_STRETCH)
-        viscosity = torch.clamp(self.sinh_of(c[:, 3]) / (stretch * stretch).mean(1),
-                                min=self.LEAST_VISCOSITY)
-        share = 1.0 / (1.0 + viscosity)
+        viscosity = self.sinh_of(c[:, 3])
+        factor = (stretch * stretch).mean(1) * (dt / self.FLOW_STEP)
+        bound = self.FLOW_POWER_LIMIT
+        # Without a yield surface the rate is linear: a power of the norm has no slope at rest.
+        power = torch.where(c1 > 0.0, torch.exp(bound * torch.tanh(c[:, 4] / bound)), one)
         # The root has no slope at 0, and no say where nothing is cut.
-        norm = torch.sqrt(torch.where(over & (norm2 > self.TINY), norm2, one))
-        ratio = torch.clamp(c1, min=0.0) / norm
-        scale = torch.where(over, 1.0 - share + share * ratio, one)
+        deviates = over & (norm2 > self.TINY)
+        norm = torch.sqrt(torch.where(deviates, norm2, one))
+        cap = torch.clamp(c1, min=0.0)
+        excess = torch.where(deviates, norm - cap, torch.zeros_like(norm))
+        cut = (cap + self.kept_excess(excess, viscosity, factor, power)) / norm
+        linear = torch.clamp(viscosity / factor, min=self.LEAST_VISCOSITY)
+        scale = torch.where(deviates, cut, linear / (1.0 + linear))
+        scale = torch.where(over, scale, one)
         mean = (torch.where(over_t, c2, t) / 3.0).unsqueeze(1)
         y = (scale.unsqueeze(1) * w + mean) * e.unsqueeze(1)
         projected = torch.matmul(U * torch.exp(y).unsqueeze(1), V.transpose(1, 2))
@@ -150,8 +181,8 @@ class Isotropic(Law):
         D_trace = D[:, 0, 0] + D[:, 1, 1] + D[:, 2, 2]
         identity = torch.eye(3, dtype=f.dtype, device=f.device)
         D_dev = D - (D_trace / 3.0).unsqueeze(1).unsqueeze(2) * identity
-        square = (D_dev * D_dev).sum([1, 2]) + self.SMOOTHING * self.SMOOTHING
-        n = torch.sqrt(square) - self.SMOOTHING
+        square = (D_dev * D_dev).sum([1, 2])
+        n = torch.sqrt(square + self.SMOOTHING * self.SMOOTHING) - self.SMOOTHING
         turned_D = torch.matmul(D_dev, U)
         aligned = (w * (U * turned_D).sum(1)).sum(1)
         if self.differentiated(F_proj):
@@ -163,24 +194,32 @@ class Isotropic(Law):
         zero = torch.zeros([rows.size(0), 6], dtype=f.dtype, device=f.device)
         rest = self.stress_network(torch.hstack([zero, rows]))
         b = self.sinh_of(a[:, 4])
-        volume = self.measure(t * e, self.exponent_of(a[:, 6]), self.exponent_of(a[:, 7]))
-        pressure = self.sinh_of(a[:, 0]) * volume / e + (a[:, 1] - rest[:, 1]) + b * D_trace / 3.0
-        half = (0.5 * self.exponent_of(a[:, 5])).unsqueeze(1)
+        limit = self.EXPONENT_LIMIT
+        volume = self.measure(t * e, self.bounded(a[:, 6], limit), self.bounded(a[:, 7], limit))
+        pressure = self.sinh_of(a[:, 0]) * volume / e + (a[:, 1] - rest[:, 1]) + (
+            (1.0 - a[:, 13]) * b * D_trace / 3.0)
+        omega = self.bounded(a[:, 9:10], limit)
         eps = torch.log(torch.clamp(sigma, min=self.MINIMUM_STRETCH))
+        eps = eps - omega * (t * e / 3.0).unsqueeze(1)
+        half1 = 0.5 * self.bounded(a[:, 5:6], limit)
+        half2 = 0.5 * self.bounded(a[:, 8:9], limit)
         a1 = (self.sinh_of(a[:, 2]) / e).unsqueeze(1)
-        spread = 1.0 / (1.0 + q).unsqueeze(1)
-        w2 = w * w
-        second = (w2 - w2.mean(1, keepdim=True)) * spread
-        d = pressure.unsqueeze(1) + self.measure(eps, half, half) * a1 + a[:, 3:4] * second
+        a2 = (self.sinh_of(a[:, 3]) / e).unsqueeze(1)
+        M = self.measure(eps, half1, half1) * a1 + self.measure(eps, half2, half2) * a2
+        d = pressure.unsqueeze(1) + M - omega * M.mean(1, keepdim=True)
+        kappa = torch.exp(self.bounded(a[:, 11], self.RATE_SCALE_LIMIT))
+        base = 1.0 + kappa * kappa * square
+        rate_power = torch.exp(self.bounded(a[:, 12], self.RATE_EXPONENT_LIMIT) * torch.log(base))
+        viscosity = b + self.sinh_of(a[:, 10]) * rate_power
         tau = torch.matmul(U * d.unsqueeze(1), U.transpose(1, 2))
-        tau = tau + b.unsqueeze(1).unsqueeze(2) * D_dev
+        tau = tau + viscosity.unsqueeze(1).unsqueeze(2) * D_dev
         if self.differentiated(F_proj):
             # (d_i - d_j)/(eps_i - eps_j)
-            limit = 2.0 * self.ARGUMENT_LIMIT
-            n_eps = torch.clamp(2.0 * half.detach() * eps.detach(), min=-limit, max=limit)
-            w0 = w.detach()
-            of_w = (a[:, 3:4] * spread / e.unsqueeze(1)).detach() * (self.left(w0) + self.right(w0))
-            slope = (a1.detach() * self.exp_divided(n_eps) + of_w) * turn
-            M = self.beside_diagonal(slope, slope)
-            tau = tau + torch.matmul(U, torch.matmul(M, U.transpose(1, 2)))
+            bound = 2.0 * self.ARGUMENT_LIMIT
+            x1 = self.bounded(2.0 * half1.detach() * eps.detach(), bound)
+            x2 = self.bounded(2.0 * half2.detach() * eps.detach(), bound)
+            slope = a1.detach() * self.exp_divided(x1) + a2.detach() * self.exp_divided(x2)
+            slope = slope * turn
+            beside = self.beside_diagonal(slope, slope)
+            tau = tau + torch.matmul(U, torch.matmul(beside, U.transpose(1, 2)))
         return (self.stress_scale(rows).unsqueeze(1).unsqueeze(2) * tau).to(F_proj.dtype)

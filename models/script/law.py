@@ -59,6 +59,10 @@ class Law(Eager):
             rows = rows.unsqueeze(0)
         return rows
 
+    # The default of project's dt is FLOW_STEP, kFlowStep of ops/kernels/learned.
+    def check_step(self, dt: float) -> None:
+        assert dt > 0.0, "uniphy law: dt: expected a time step above 0 s, found {}".format(dt)
+
     # The code of the first training trajectory of a material, [Z].
     def code_of(self, material: str) -> Tensor:
         row = 0

@@ -88,7 +88,8 @@ class Published(Law):
         sigma = torch.masked_fill(torch.hstack([s0, s1, s2]) * scale[:, 0], vanishing[:, 0], 0.0)
         return torch.dstack([u0, u1, u2]), sigma, torch.dstack(v)
 
-    def project(self, F: Tensor, z: Tensor) -> Tensor:
+    def project(self, F: Tensor, z: Tensor, dt: float = 2e-4) -> Tensor:
+        self.check_step(dt)
         f = self.matrices("F", F, -1)
         rows = self.latent(z, f.size(0))
         U, sigma, V = self.spectral(f)

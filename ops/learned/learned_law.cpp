@@ -3,6 +3,8 @@
 #include <torch/torch.h>
 
 #include <algorithm>
+#include <cmath>
+#include <string>
 #include <vector>
 
 #include "ops/base/once_differentiable.hpp"
@@ -42,8 +44,9 @@ void check_arguments(const LearnedNetworks& networks, const char* F_name, const 
 struct Kernel : torch::CustomClassHolder {
   std::shared_ptr<const LawKernel<float>> narrow;
   std::shared_ptr<const LawKernel<double>> wide;
+  double dt;
 
-  Kernel(const LearnedNetworks& networks, LawPart part, const Tensor& z) {
+  Kernel(const LearnedNetworks& networks, LawPart part, const Tensor& z, double step) : dt(step) {
     kernels::LawDescription d;
     d.id = kernels::LawId::learned;
     d.weights = kernel_weights(networks, part);
@@ -57,21 +60,21 @@ struct Kernel : torch::CustomClassHolder {
 };
 
 template <class T>
-void evaluate(const LawKernel<T>& law, const Tensor& F, const Tensor& C, const Tensor& F_proj,
-              const Tensor& tau) {
+void evaluate(const LawKernel<T>& law, double dt, const Tensor& F, const Tensor& C,
+              const Tensor& F_proj, const Tensor& tau) {
   const std::ptrdiff_t count = F.size(0);
   const View<const T> f = matrix_view<T>(F), c = matrix_view<T>(C);
   const View<T> fp = mutable_matrix_view<T>(F_proj), t = mutable_matrix_view<T>(tau);
 #pragma omp parallel for schedule(static)
   for (std::ptrdiff_t p = 0; p < count; p += kBlock)
-    law.evaluate(std::min(kBlock, count - p), T(0), f.from(p), c.from(p), fp.from(p), t.from(p));
+    law.evaluate(std::min(kBlock, count - p), T(dt), f.from(p), c.from(p), fp.from(p), t.from(p));
 }
 
 /// Gradients of F, C, z and all weights, flat, each where it is defined.
 template <class T>
-void adjoint(const LawKernel<T>& law, const Tensor& F, const Tensor& C, const Tensor& grad_F_proj,
-             const Tensor& grad_tau, const Tensor& grad_F, const Tensor& grad_C,
-             const Tensor& grad_z, const Tensor& grad_weights) {
+void adjoint(const LawKernel<T>& law, double dt, const Tensor& F, const Tensor& C,
+             const Tensor& grad_F_proj, const Tensor& grad_tau, const Tensor& grad_F,
+             const Tensor& grad_C, const Tensor& grad_z, const Tensor& grad_weights) {
   const std::ptrdiff_t count = F.size(0), blocks = (count + kBlock - 1) / kBlock;
   const std::ptrdiff_t size = law.accumulator_size(), weight_size = law.weight_sums_size();
   const View<const T> f = matrix_view<T>(F), c = matrix_view<T>(C),
@@ -89,7 +92,7 @@ void adjoint(const LawKernel<T>& law, const Tensor& F, const Tensor& C, const Te
     T* const of_part = weights ? weight_sums.data() + part * weight_size : nullptr;
     for (std::ptrdiff_t b = part * blocks / parts; b < (part + 1) * blocks / parts; ++b) {
       const std::ptrdiff_t p = b * kBlock;
-      law.adjoint(std::min(kBlock, count - p), T(0), f.from(p), c.from(p), gp.from(p), gt.from(p),
+      law.adjoint(std::min(kBlock, count - p), T(dt), f.from(p), c.from(p), gp.from(p), gt.from(p),
                   gf.from(p), gc.from(p), any ? sums.data() + b * size : nullptr, of_part);
     }
   }
@@ -110,14 +113,14 @@ class LearnedLawFunction : public torch::autograd::Function<LearnedLawFunction> 
   /// The numbers of the networks are there for the graph; the kernels take them from `networks`.
   static variable_list forward(AutogradContext* ctx, const Tensor& F, const Tensor& C,
                                const Tensor& z, const Tensor& projection, const Tensor& stress,
-                               const LearnedNetworks& networks, LawPart part) {
+                               const LearnedNetworks& networks, LawPart part, double dt) {
     const Tensor f = F.contiguous(), c = C.contiguous();
-    const auto kernel = c10::make_intrusive<Kernel>(networks, part, z);
+    const auto kernel = c10::make_intrusive<Kernel>(networks, part, z, dt);
     Tensor F_proj = torch::empty_like(f), tau = torch::empty_like(f);
     if (kernel->wide)
-      evaluate(*kernel->wide, f, c, F_proj, tau);
+      evaluate(*kernel->wide, dt, f, c, F_proj, tau);
     else
-      evaluate(*kernel->narrow, f, c, F_proj, tau);
+      evaluate(*kernel->narrow, dt, f, c, F_proj, tau);
     ctx->save_for_backward({f, c, z});
     ctx->saved_data["kernel"] = torch::IValue::make_capsule(kernel);
     ctx->saved_data["projection"] = projection.numel();
@@ -128,7 +131,7 @@ class LearnedLawFunction : public torch::autograd::Function<LearnedLawFunction> 
   }
 
   static variable_list backward(AutogradContext* ctx, variable_list grad) {
-    variable_list result(7);
+    variable_list result(8);
     if (!grad[0].defined() && !grad[1].defined()) return result;
     const auto saved = ctx->get_saved_variables();
     const Tensor F = saved[0], C = saved[1], z = saved[2];
@@ -147,7 +150,8 @@ class LearnedLawFunction : public torch::autograd::Function<LearnedLawFunction> 
     const auto run = [&](const auto& law) {
       if (of_projection || of_stress)
         grad_weights = torch::empty({std::int64_t(law.weight_size())}, F.options());
-      adjoint(law, F, C, grad_F_proj, grad_tau, result[0], result[1], result[2], grad_weights);
+      adjoint(law, kernel->dt, F, C, grad_F_proj, grad_tau, result[0], result[1], result[2],
+              grad_weights);
     };
     if (kernel->wide)
       run(*kernel->wide);
@@ -164,34 +168,38 @@ class LearnedLawFunction : public torch::autograd::Function<LearnedLawFunction> 
 };
 
 LawOutput apply(const LearnedNetworks& networks, LawPart part, const Tensor& F, const Tensor& C,
-                const Tensor& z) {
+                const Tensor& z, double dt) {
+  if (!(dt > 0) || !std::isfinite(dt))
+    throw Error(std::string(kOp) + ": dt: expected a time step above 0 s, found " +
+                std::to_string(dt));
   // A network that does not run has no gradient.
   const Tensor none = torch::empty({0}, networks.projection.numbers.options().requires_grad(false));
   const auto r = LearnedLawFunction::apply(
       F, C, z, part == LawPart::stress ? none : networks.projection.numbers,
-      part == LawPart::projection ? none : networks.stress.numbers, networks, part);
+      part == LawPart::projection ? none : networks.stress.numbers, networks, part, dt);
   return {r[0], r[1]};
 }
 
 }  // namespace
 
 LawOutput learned_law(const LearnedNetworks& networks, const Tensor& F_trial, const Tensor& C,
-                      const Tensor& z) {
+                      const Tensor& z, double dt) {
   check_arguments(networks, "F_trial", F_trial, C, z);
   if (!C.defined()) check_like(kOp, "C", C, F_trial);
-  return apply(networks, LawPart::both, F_trial, C, z);
+  return apply(networks, LawPart::both, F_trial, C, z, dt);
 }
 
-Tensor learned_project(const LearnedNetworks& networks, const Tensor& F, const Tensor& z) {
+Tensor learned_project(const LearnedNetworks& networks, const Tensor& F, const Tensor& z,
+                       double dt) {
   check_arguments(networks, "F", F, Tensor(), z);
-  return apply(networks, LawPart::projection, F, torch::zeros_like(F), z).F_proj;
+  return apply(networks, LawPart::projection, F, torch::zeros_like(F), z, dt).F_proj;
 }
 
 Tensor learned_stress(const LearnedNetworks& networks, const Tensor& F_proj, const Tensor& C,
                       const Tensor& z) {
   check_arguments(networks, "F_proj", F_proj, C, z);
   if (!C.defined()) check_like(kOp, "C", C, F_proj);
-  return apply(networks, LawPart::stress, F_proj, C, z).tau;
+  return apply(networks, LawPart::stress, F_proj, C, z, kernels::kFlowStep).tau;
 }
 
 }  // namespace uniphy::ops

@@ -10,7 +10,8 @@
 // that answer to z alone have the gradient of any others: that of the weights of the state features
 // is not zero, though they are.
 //
-// F, F_trial, F_proj, C [P, 3, 3], z [Z]: CPU, all float32 or all float64. C in 1/s, tau in Pa. The
+// F, F_trial, F_proj, C [P, 3, 3], z [Z]: CPU, all float32 or all float64. C in 1/s, tau in Pa, dt,
+// the time step that a viscoplastic projection depends on, in s. The
 // results, and the gradients of z and of the networks, have the same bits on any number of threads.
 // Throws Error naming the argument, what was expected and what was found.
 
@@ -23,11 +24,12 @@ struct LawOutput {
 
 /// F_proj = G(F_trial), tau = τ(F_proj, C), in one pass.
 LawOutput learned_law(const LearnedNetworks& networks, const torch::Tensor& F_trial,
-                      const torch::Tensor& C, const torch::Tensor& z);
+                      const torch::Tensor& C, const torch::Tensor& z,
+                      double dt = kernels::kFlowStep);
 
 /// G(F); the stress network does not run.
 torch::Tensor learned_project(const LearnedNetworks& networks, const torch::Tensor& F,
-                              const torch::Tensor& z);
+                              const torch::Tensor& z, double dt = kernels::kFlowStep);
 
 /// τ(F_proj, C); the projection network does not run.
 torch::Tensor learned_stress(const LearnedNetworks& networks, const torch::Tensor& F_proj,

@@ -27,22 +27,22 @@ std::tuple<Tensor, Tensor> learned_law_op(const Tensor& F_trial, const Tensor& C
                                           const std::string& form, const std::string& activation,
                                           at::IntArrayRef projection_widths,
                                           const Tensor& projection, at::IntArrayRef stress_widths,
-                                          const Tensor& stress) {
+                                          const Tensor& stress, double dt) {
   const LawOutput r =
       learned_law(learned_networks("learned_law", form, activation, projection_widths, projection,
                                    stress_widths, stress, code_size("learned_law", z)),
-                  F_trial, C, z);
+                  F_trial, C, z, dt);
   return {r.F_proj, r.tau};
 }
 
 Tensor learned_project_op(const Tensor& F, const Tensor& z, const std::string& form,
                           const std::string& activation, at::IntArrayRef projection_widths,
                           const Tensor& projection, at::IntArrayRef stress_widths,
-                          const Tensor& stress) {
+                          const Tensor& stress, double dt) {
   return learned_project(
       learned_networks("learned_project", form, activation, projection_widths, projection,
                        stress_widths, stress, code_size("learned_project", z)),
-      F, z);
+      F, z, dt);
 }
 
 Tensor learned_stress_op(const Tensor& F_proj, const Tensor& C, const Tensor& z,
@@ -59,12 +59,14 @@ Tensor learned_stress_op(const Tensor& F_proj, const Tensor& C, const Tensor& z,
 
 void define_learned_law(torch::Library& library) {
   const std::string networks = kNetworkArguments;
+  // s, which a viscoplastic projection depends on.
+  const std::string step = ", float dt=" + std::to_string(kernels::kFlowStep);
   // F_proj = G(F_trial) and tau = τ(F_proj, C) in Pa, in one pass: ops/learned/learned_law.hpp.
-  library.def(("learned_law(Tensor F_trial, Tensor C, Tensor z, *, " + networks +
+  library.def(("learned_law(Tensor F_trial, Tensor C, Tensor z, *, " + networks + step +
                ") -> (Tensor F_proj, Tensor tau)")
                   .c_str(),
               &learned_law_op);
-  library.def(("learned_project(Tensor F, Tensor z, *, " + networks + ") -> Tensor").c_str(),
+  library.def(("learned_project(Tensor F, Tensor z, *, " + networks + step + ") -> Tensor").c_str(),
               &learned_project_op);
   library.def(
       ("learned_stress(Tensor F_proj, Tensor C, Tensor z, *, " + networks + ") -> Tensor").c_str(),

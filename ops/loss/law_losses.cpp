@@ -61,19 +61,28 @@ kernels::SampleFeatures<T> samples_of(const Arguments& a, std::int64_t i) {
           T(kernels::kStrainScale * std::exp(kernels::kStrainRate * z1))};
 }
 
+/// Where the answers at rest that are taken off stand.
+constexpr std::int64_t cap_at(std::int64_t i) {
+  return kernels::kCapOutputs * i + kernels::kTraceCap;
+}
+constexpr std::int64_t pressure_at(std::int64_t i) {
+  return kernels::kStressOutputs * i + kernels::kPressure;
+}
+
 template <class T>
 kernels::IsotropicAnswers<T> answers_of(const Arguments& a, std::int64_t i) {
   const auto square = [](double x) { return T(x * x); };
   const double z0 = a.z.data_ptr<T>()[i * a.z.size(1)];
-  const T* rms = a.scales.data_ptr<T>() + 3 * i;
+  const T* rms = a.scales.data_ptr<T>() + 4 * i;
   return {samples_of<T>(a, i),
           a.caps.data_ptr<T>() + i * a.caps.stride(0),
           a.moduli.data_ptr<T>() + i * a.moduli.stride(0),
           a.caps.size(1) > 1,
           a.moduli.size(1) > 1,
-          std::min(a.caps_rest.data_ptr<T>()[4 * i + 1], T(0)),
-          a.moduli_rest.data_ptr<T>()[8 * i + 1],
+          std::min(a.caps_rest.data_ptr<T>()[cap_at(i)], T(0)),
+          a.moduli_rest.data_ptr<T>()[pressure_at(i)],
           T(kernels::kStressScale * std::exp(kernels::kStressRate * z0)),
+          rms[3],
           square(a.floor * rms[0]),
           square(a.floor * (rms[2] > 0 ? rms[2] : rms[1])),
           T(a.delta)};
@@ -112,9 +121,9 @@ void adjoint(const Arguments& a, const Tensor& grad_losses, const Gradients& to)
     if (caps) g.caps = caps + i * a.caps.stride(0);
     if (moduli) g.moduli = moduli + i * a.moduli.stride(0);
     table.errors_adjoint(answers_of<T>(a, i), weights + i * kIsotropicLosses, g);
-    const bool caps_at_rest = a.caps_rest.data_ptr<T>()[4 * i + 1] <= 0;
-    if (caps_rest) caps_rest[4 * i + 1] = caps_at_rest ? g.rest_cap : T(0);
-    if (moduli_rest) moduli_rest[8 * i + 1] = g.rest_pressure;
+    const bool caps_at_rest = a.caps_rest.data_ptr<T>()[cap_at(i)] <= 0;
+    if (caps_rest) caps_rest[cap_at(i)] = caps_at_rest ? g.rest_cap : T(0);
+    if (moduli_rest) moduli_rest[pressure_at(i)] = g.rest_pressure;
     if (z) {
       z[i * latent] = T(kernels::kStressRate) * g.log_s;
       z[i * latent + 1] = T(kernels::kStrainRate) * g.log_e;
@@ -241,11 +250,13 @@ LawLosses law_losses(const IsotropicBatch& batch, const Tensor& scales, const Te
   a.columns = batch.columns, a.rows = batch.rows, a.z = z;
   check_batch(kOp, a);
   const auto type = a.columns.scalar_type();
-  a.scales = checked(kOp, "scales", scales, type, {a.trajectories(), 3});
-  a.caps = checked_answers("caps", answers.caps, a, 4);
-  a.caps_rest = checked(kOp, "caps_rest", answers.caps_rest, type, {a.trajectories(), 1, 4});
-  a.moduli = checked_answers("moduli", answers.moduli, a, 8);
-  a.moduli_rest = checked(kOp, "moduli_rest", answers.moduli_rest, type, {a.trajectories(), 1, 8});
+  a.scales = checked(kOp, "scales", scales, type, {a.trajectories(), 4});
+  a.caps = checked_answers("caps", answers.caps, a, kernels::kCapOutputs);
+  a.caps_rest = checked(kOp, "caps_rest", answers.caps_rest, type,
+                        {a.trajectories(), 1, kernels::kCapOutputs});
+  a.moduli = checked_answers("moduli", answers.moduli, a, kernels::kStressOutputs);
+  a.moduli_rest = checked(kOp, "moduli_rest", answers.moduli_rest, type,
+                          {a.trajectories(), 1, kernels::kStressOutputs});
   const variable_list r =
       LawLossesFunction::apply(a.z, a.caps, a.caps_rest, a.moduli, a.moduli_rest, a.columns, a.rows,
                                a.scales, measure.floor, measure.delta);

@@ -29,10 +29,10 @@ IsotropicFeatures isotropic_features(const IsotropicBatch& batch, const torch::T
 /// The networks' answers, to every sample or ([N, 1, ...]) to z alone, and those at rest, of which
 /// c₂ and a₀ are taken off.
 struct IsotropicAnswers {
-  torch::Tensor caps;         ///< c₀, c₂, m, η̃: [N, m or 1, 4]
-  torch::Tensor caps_rest;    ///< [N, 1, 4]
-  torch::Tensor moduli;       ///< k̃, a₀, ã₁, a₂, b̃, n, γ, δ: [N, m or 1, 8]
-  torch::Tensor moduli_rest;  ///< [N, 1, 8]
+  torch::Tensor caps;         ///< [N, m or 1, kernels::kCapOutputs]
+  torch::Tensor caps_rest;    ///< [N, 1, kernels::kCapOutputs]
+  torch::Tensor moduli;       ///< [N, m or 1, kernels::kStressOutputs]
+  torch::Tensor moduli_rest;  ///< [N, 1, kernels::kStressOutputs]
 };
 
 /// What errors are measured by.
@@ -48,7 +48,8 @@ struct LawLosses {
   /// [N, 2], mean squared relative errors of stress and projection, for reports: no gradient.
   torch::Tensor errors;
 };
-/// scales: [N, 3], RMS of stress, strain and decrease of every trajectory.
+/// scales: [N, 4], RMS of stress, strain and decrease of every trajectory, and kFlowStep over its
+/// time step.
 LawLosses law_losses(const IsotropicBatch& batch, const torch::Tensor& scales,
                      const torch::Tensor& z, const IsotropicAnswers& answers,
                      const ErrorMeasure& measure);

@@ -2,6 +2,10 @@
 
 #include <torch/torch.h>
 
+#include <limits>
+
+#include "ops/kernels/learned/learned_law_weights.hpp"
+#include "ops/kernels/learned/power_law.hpp"
 #include "ops/kernels/spectral/limits.hpp"
 
 namespace uniphy::ops::reference {
@@ -103,6 +107,52 @@ Tensor hencky_tensor(const Tensor& F) { return HenckyFunction::apply(F); }
 
 Tensor polar_rotation(const Tensor& F, const SignedSvd& factors) {
   return PolarFunction::apply(F, factors.U.detach(), factors.sigma.detach(), factors.V.detach());
+}
+
+Tensor sinh_of(const Tensor& output) { return bounded(output, kernels::kSinhLimit).sinh(); }
+
+Tensor bounded(const Tensor& output, double bound) { return output.clamp(-bound, bound); }
+
+Tensor strain_measure(const Tensor& x, const Tensor& gamma, const Tensor& delta) {
+  const Tensor y = bounded(gamma * x, kernels::kArgumentLimit), small = y.abs() < 1e-2;
+  const Tensor far = torch::where(small, torch::ones_like(y), y), y2 = y * y;
+  const Tensor series = 1 + y2 / 6 * (1 + y2 / 20 * (1 + y2 / 42 * (1 + y2 / 72)));
+  const Tensor ratio = torch::where(small, series, far.sinh() / far);
+  return x * bounded(delta * x, kernels::kArgumentLimit).exp() * ratio;
+}
+
+Tensor flow_exponent(const Tensor& output) {
+  constexpr double kLimit = kernels::kFlowPowerLimit;
+  return (kLimit * (output / kLimit).tanh()).exp();
+}
+
+Tensor relative_viscosity(const Tensor& v, const Tensor& factor) {
+  return (v / factor).clamp_min(kernels::kLeastViscosity);
+}
+
+Tensor kept_excess(const Tensor& x, const Tensor& v, const Tensor& factor, const Tensor& p) {
+  const double tiny = x.scalar_type() == torch::kFloat64
+                          ? std::numeric_limits<double>::min()
+                          : double(std::numeric_limits<float>::min());
+  const Tensor powered = (v > tiny) & (x > tiny) & (p != 1), one = torch::ones_like(x * v * p);
+  const Tensor excess = torch::where(powered, x, one), flow = torch::where(powered, v, one);
+  const Tensor log_A = (p - 1) * ((excess / kernels::kFlowExcess).log() + flow.log1p()) +
+                       factor.log() - p * flow.log();
+  // w = log of the share that stays: log(e^w + A e^{pw}) = 0, by Newton's method; its last step
+  // carries the derivative.
+  Tensor w;
+  {
+    const torch::NoGradGuard no_grad;
+    w = (-log_A / p).clamp_max(0);
+    for (int i = 0; i < 9; ++i) {
+      const Tensor a = w.exp(), b = (p * w + log_A).exp(), sum = a + b;
+      w = (w - sum.log() * sum / (a + p * b)).clamp_max(0);
+    }
+  }
+  const Tensor a = w.exp(), b = (p * w + log_A).exp(), sum = a + b;
+  const Tensor share = (w - sum.log() * (sum / (a + p * b)).detach()).exp();
+  const Tensor linear = relative_viscosity(v, factor);
+  return torch::where(powered, excess * share, x * linear / (1 + linear));
 }
 
 }  // namespace uniphy::ops::reference

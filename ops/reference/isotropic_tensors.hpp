@@ -20,4 +20,21 @@ torch::Tensor polar_rotation(const torch::Tensor& F, const SignedSvd& factors);
 /// exp M of a symmetric M [P, 3, 3]. (torch::matrix_exp is only good to 1e-9 in float64.)
 torch::Tensor symmetric_exp(const torch::Tensor& M);
 
+/// Outputs of networks whose sinh is a coefficient, or that are bounded by ±bound.
+torch::Tensor sinh_of(const torch::Tensor& output);
+torch::Tensor bounded(const torch::Tensor& output, double bound);
+
+/// x exp(δx) sinh(γx)/(γx), number by number (ops/kernels/spectral/strain_measure.hpp).
+torch::Tensor strain_measure(const torch::Tensor& x, const torch::Tensor& gamma,
+                             const torch::Tensor& delta);
+
+/// What stays of an excess over a cap, number by number: kept_excess of
+/// ops/kernels/learned/return_caps.hpp.
+torch::Tensor kept_excess(const torch::Tensor& x, const torch::Tensor& v,
+                          const torch::Tensor& factor, const torch::Tensor& p);
+/// The power that an output stands for, p = exp(P tanh(p̃/P)).
+torch::Tensor flow_exponent(const torch::Tensor& output);
+/// v/f, bounded from below.
+torch::Tensor relative_viscosity(const torch::Tensor& v, const torch::Tensor& factor);
+
 }  // namespace uniphy::ops::reference

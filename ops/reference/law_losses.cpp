@@ -3,6 +3,7 @@
 #include <torch/torch.h>
 
 #include "ops/kernels/learned/learned_law_weights.hpp"
+#include "ops/reference/isotropic_tensors.hpp"
 #include "ops/reference/learned_law.hpp"
 
 namespace uniphy::ops::reference {
@@ -19,25 +20,6 @@ Tensor gather(const IsotropicBatch& batch) {
 }
 Tensor columns(const Tensor& batch, int first, int count) { return batch.narrow(2, first, count); }
 Tensor column(const Tensor& batch, int index) { return batch.select(2, index); }
-
-Tensor sinh_of(const Tensor& x) {
-  return torch::sinh(x.clamp(-kernels::kSinhLimit, kernels::kSinhLimit));
-}
-Tensor exponent_of(const Tensor& x) {
-  return x.clamp(-kernels::kExponentLimit, kernels::kExponentLimit);
-}
-Tensor argument_of(const Tensor& x) {
-  return x.clamp(-kernels::kArgumentLimit, kernels::kArgumentLimit);
-}
-
-/// x exp(δx) sinh(γx)/(γx), the measures of ops/kernels/spectral/strain_measure.hpp.
-Tensor strain_measure(const Tensor& x, const Tensor& gamma, const Tensor& delta) {
-  const Tensor y = argument_of(gamma * x), small = y.abs() < 1e-2;
-  const Tensor far = torch::where(small, torch::ones_like(y), y), y2 = y * y;
-  const Tensor ratio =
-      torch::where(small, 1.0 + y2 / 6.0 * (1.0 + y2 / 20.0), torch::sinh(far) / far);
-  return x * torch::exp(argument_of(delta * x)) * ratio;
-}
 
 /// The least weight of a cap that is missed where the law does not cut.
 constexpr double kLeastShare = 0.05;
@@ -69,14 +51,18 @@ ProjectionErrors projection_errors(const Tensor& batch, const Tensor& scales, co
                                    const IsotropicAnswers& answers, double floor) {
   const Tensor deviator = columns(batch, Column::deviator, 3), trace = column(batch, Column::trace);
   const Tensor &c = answers.caps, inv_e = 1.0 / e;
-  const Tensor slope = sinh_of(c.select(2, 2));
-  const Tensor c1 = c.select(2, 0) + slope * trace * inv_e;
+  const auto output = [&c](kernels::CapOutput k) { return c.select(2, k); };
+  const Tensor slope = sinh_of(output(kernels::kCapSlope));
+  const Tensor c1 = output(kernels::kCap) + slope * trace * inv_e;
   const Tensor cap_q = e * c1;
-  const Tensor cap_t = e * (c.select(2, 1) - answers.caps_rest.select(2, 1).clamp_max(0.0));
+  const Tensor cap_t = e * (output(kernels::kTraceCap) -
+                            answers.caps_rest.select(2, kernels::kTraceCap).clamp_max(0.0));
   const Tensor mean_square =
       torch::exp(2.0 * (deviator + trace.unsqueeze(2) / 3.0)).mean(2);  // b̄, where nothing clamps
-  const Tensor share =
-      1.0 / (1.0 + (sinh_of(c.select(2, 3)) / mean_square).clamp_min(kernels::kLeastViscosity));
+  const Tensor flow_time = scales.select(1, 3).unsqueeze(1);
+  const Tensor viscosity = sinh_of(output(kernels::kCapViscosity));
+  const Tensor factor = mean_square / flow_time;
+  const Tensor share = 1.0 / (1.0 + relative_viscosity(viscosity, factor));
   const Tensor norm = deviator.norm(2, 2);
   const Tensor norm_kind = column(batch, Column::norm_yields);
   const Tensor norm_decrease = column(batch, Column::norm_decrease);
@@ -86,9 +72,13 @@ ProjectionErrors projection_errors(const Tensor& batch, const Tensor& scales, co
   // Where the law does not cut, any cap beyond the strain is right, the less so the smaller the
   // share; where it cuts to nothing, any cap at or below zero is.
   const Tensor missed = torch::relu(norm - cap_q) * share.detach().clamp_min(kLeastShare);
-  const auto of_norm = [&](const Tensor& r) {
-    return torch::where(norm_kind > 1.5, norm - r * (norm - torch::relu(cap_q)),
-                        torch::where(norm_kind > 0.5, r * (norm - cap_q) - norm_decrease, missed));
+  const Tensor to_zero = norm_kind > 1.5, reached = torch::where(to_zero, cap_q.relu(), cap_q);
+  const Tensor over = norm - reached, power = flow_exponent(output(kernels::kFlowExponent));
+  const Tensor exponent = torch::where(c1 > 0, power, torch::ones_like(c1));
+  const Tensor kept = e * kept_excess(over * inv_e, viscosity, factor, exponent);
+  const auto of_norm = [&](const Tensor& y) {
+    return torch::where(to_zero, reached + y,
+                        torch::where(norm_kind > 0.5, over - y - norm_decrease, missed));
   };
   // Whatever the share, a cap is no higher than what a sample that yields comes down to.
   const Tensor above =
@@ -107,33 +97,47 @@ ProjectionErrors projection_errors(const Tensor& batch, const Tensor& scales, co
   const Tensor unit = torch::where(decrease_rms > 0, decrease_rms, strain_rms);
   const Tensor others = square(above) + square(of_fluid) + square(of_trace) / 3.0;
   const Tensor size2 = decrease2 + square(floor * unit) + 1e-20;
-  return {(square(of_norm(share)) + others) / size2,
-          (square(of_norm(torch::ones_like(share))) + others) / size2, share};
+  return {(square(of_norm(kept)) + others) / size2,
+          (square(of_norm(torch::zeros_like(kept))) + others) / size2, share};
 }
 
 /// [N, m], in the frame of the projected F.
 Tensor stress_errors(const Tensor& batch, const Tensor& scales, const Tensor& s, const Tensor& e,
                      const IsotropicAnswers& answers, double floor) {
-  const Tensor &a = answers.moduli, inv_e = 1.0 / e;
+  const Tensor inv_e = 1.0 / e;
+  const auto output = [&answers](kernels::StressOutput k) { return answers.moduli.select(2, k); };
+  const auto exponent = [&](kernels::StressOutput k) {
+    return bounded(output(k), kernels::kExponentLimit);
+  };
   const Tensor deviator = columns(batch, Column::projected_deviator, 3);
   const Tensor trace = column(batch, Column::projected_trace);
-  const Tensor w = deviator * inv_e.unsqueeze(2);
   const Rate rate = rate_of(batch);
-  const Tensor b = sinh_of(a.select(2, 4));
+  const Tensor rate_square = square(rate.deviatoric).sum(2) + 2.0 * square(rate.off).sum(2);
+  const Tensor kappa = bounded(output(kernels::kRateScale), kernels::kRateScaleLimit).exp();
+  const Tensor nu = bounded(output(kernels::kRateExponent), kernels::kRateExponentLimit);
+  const Tensor b = sinh_of(output(kernels::kViscosity));
+  const Tensor viscosity =
+      b + sinh_of(output(kernels::kRateViscosity)) * (1.0 + square(kappa) * rate_square).pow(nu);
   const Tensor volume =
-      strain_measure(trace, exponent_of(a.select(2, 6)), exponent_of(a.select(2, 7)));
-  const Tensor pressure = sinh_of(a.select(2, 0)) * volume * inv_e + a.select(2, 1) -
-                          answers.moduli_rest.select(2, 1) + b * rate.trace / 3.0;
-  const Tensor half = 0.5 * exponent_of(a.narrow(2, 5, 1));
-  const Tensor principal = strain_measure(deviator + trace.unsqueeze(2) / 3.0, half, half) *
-                           (sinh_of(a.select(2, 2)) * inv_e).unsqueeze(2);
-  const Tensor w2 = square(w);
-  const Tensor second = (w2 - w2.mean(2, true)) / (1.0 + invariants(w).q).unsqueeze(2);
-  const Tensor tau_diagonal = pressure.unsqueeze(2) + principal + a.narrow(2, 3, 1) * second +
-                              b.unsqueeze(2) * rate.deviatoric;
+      strain_measure(trace, exponent(kernels::kVolumeGamma), exponent(kernels::kVolumeDelta));
+  const Tensor pressure = sinh_of(output(kernels::kBulk)) * volume * inv_e +
+                          output(kernels::kPressure) -
+                          answers.moduli_rest.select(2, kernels::kPressure) +
+                          b * (1.0 - output(kernels::kBulkRateShare)) * rate.trace / 3.0;
+  const Tensor omega = exponent(kernels::kIsochoricShare).unsqueeze(2);
+  const Tensor x = deviator + (1.0 - omega) * trace.unsqueeze(2) / 3.0;
+  const auto term = [&](kernels::StressOutput a, kernels::StressOutput n) {
+    const Tensor half = 0.5 * exponent(n).unsqueeze(2);
+    return strain_measure(x, half, half) * (sinh_of(output(a)) * inv_e).unsqueeze(2);
+  };
+  const Tensor M = term(kernels::kShear, kernels::kShearExponent) +
+                   term(kernels::kSecondShear, kernels::kSecondExponent);
+  const Tensor tau_diagonal = pressure.unsqueeze(2) + M - omega * M.mean(2, true) +
+                              viscosity.unsqueeze(2) * rate.deviatoric;
   const Tensor tau = columns(batch, Column::stress, 6), s2 = s.unsqueeze(2);
-  const Tensor error2 = square(s2 * tau_diagonal - tau.narrow(2, 0, 3)).sum(2) +
-                        2.0 * square(s2 * b.unsqueeze(2) * rate.off - tau.narrow(2, 3, 3)).sum(2);
+  const Tensor error2 =
+      square(s2 * tau_diagonal - tau.narrow(2, 0, 3)).sum(2) +
+      2.0 * square(s2 * viscosity.unsqueeze(2) * rate.off - tau.narrow(2, 3, 3)).sum(2);
   const Tensor tau2 = square(tau.narrow(2, 0, 3)).sum(2) + 2.0 * square(tau.narrow(2, 3, 3)).sum(2);
   return error2 / (tau2 + square(floor * scales.select(1, 0)).unsqueeze(1) + 1e-20);
 }

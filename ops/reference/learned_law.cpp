@@ -36,23 +36,6 @@ Tensor contract(const Tensor& a, const Tensor& b) { return (a * b).sum({1, 2}); 
 Tensor deviator(const Tensor& m) { return m - at_matrix(trace_of(m) / 3) * identity(m); }
 Tensor symmetric(const Tensor& m) { return 0.5 * (m + m.mT()); }
 
-Tensor sinh_of(const Tensor& x) {
-  return x.clamp(-kernels::kSinhLimit, kernels::kSinhLimit).sinh();
-}
-Tensor exponent_of(const Tensor& x) {
-  return x.clamp(-kernels::kExponentLimit, kernels::kExponentLimit);
-}
-
-/// t exp(δt) sinh(γt)/(γt), each [P].
-Tensor volume_measure(const Tensor& t, const Tensor& gamma, const Tensor& delta) {
-  const Tensor y = (gamma * t).clamp(-kernels::kArgumentLimit, kernels::kArgumentLimit);
-  const Tensor small = y.abs() < 1e-2, far = torch::where(small, torch::ones_like(y), y);
-  const Tensor y2 = y * y;
-  const Tensor series = 1 + y2 / 6 * (1 + y2 / 20 * (1 + y2 / 42 * (1 + y2 / 72)));
-  const Tensor ratio = torch::where(small, series, far.sinh() / far);
-  return t * (delta * t).clamp(-kernels::kArgumentLimit, kernels::kArgumentLimit).exp() * ratio;
-}
-
 /// (exp(n H) − I)/n, n [P].
 Tensor seth_hill_measure(const Tensor& H, const Tensor& n) {
   const Tensor small = n.abs() < 1e-2, far = torch::where(small, torch::ones_like(n), n);
@@ -81,11 +64,11 @@ Invariants invariants(const Tensor& H, const Tensor& e) {
   return v;
 }
 
-Tensor isotropic_project(const LearnedNetworks& law, const Tensor& F, const Tensor& z) {
+Tensor isotropic_project(const LearnedNetworks& law, const Tensor& F, const Tensor& z, double dt) {
   const Tensor H = hencky_tensor(F);
   const Tensor e = strain_scale(z);
-  const IsotropicCaps caps = isotropic_caps(law, H, z);
-  const Tensor cap_q = e * caps.c1.clamp_min(0), cap_t = e * caps.c2;
+  const IsotropicCaps caps = isotropic_caps(law, H, z, dt);
+  const Tensor least_q = caps.c1.clamp_min(0), cap_q = e * least_q, cap_t = e * caps.c2;
   const Tensor H_dev = deviator(H), t = trace_of(H), norm2 = contract(H_dev, H_dev);
   const Tensor one = torch::ones_like(norm2);
   const double tiny = H.scalar_type() == torch::kFloat64
@@ -95,7 +78,9 @@ Tensor isotropic_project(const LearnedNetworks& law, const Tensor& F, const Tens
   const Tensor norm = torch::where(deviates, norm2, one).sqrt();
   // c₁ ≤ 0 yields even at ‖ε̂‖ = 0, where only the derivative can tell.
   const Tensor over = (deviates & (norm > cap_q)) | (caps.c1 <= 0), over_t = t > cap_t;
-  const Tensor cut = 1 - caps.share + caps.share * cap_q / norm * deviates;
+  const Tensor kept = kept_excess(norm / e - least_q, caps.viscosity, caps.factor, caps.exponent);
+  const Tensor linear = relative_viscosity(caps.viscosity, caps.factor);
+  const Tensor cut = torch::where(deviates, e * (least_q + kept) / norm, linear / (1 + linear));
   const Tensor scale = torch::where(over, cut, one);
   const Tensor trace_proj = torch::where(over_t, cap_t, t);
   const Tensor M = at_matrix(scale) * H_dev + at_matrix(trace_proj / 3) * identity(F);
@@ -143,17 +128,20 @@ Tensor strain_scale(const Tensor& z) {
   return kernels::kStrainScale * torch::exp(kernels::kStrainRate * z.select(-1, 1));
 }
 
-IsotropicCaps isotropic_caps(const LearnedNetworks& law, const Tensor& H, const Tensor& z) {
+IsotropicCaps isotropic_caps(const LearnedNetworks& law, const Tensor& H, const Tensor& z,
+                             double dt) {
   const Invariants v = invariants(H, strain_scale(z));
   const Tensor c = network(law, law.projection, torch::stack({v.t, v.q, v.cubic}, 1), z);
-  const Tensor rest = at_rest(law, law.projection, z).select(1, 1).clamp_max(0);
-  const Tensor slope = sinh_of(c.select(1, 2));
+  const Tensor rest = at_rest(law, law.projection, z).select(1, kernels::kTraceCap).clamp_max(0);
+  const Tensor slope = sinh_of(c.select(1, kernels::kCapSlope));
   const Tensor mean_square = trace_of(symmetric_exp(2 * H)) / 3;
   IsotropicCaps caps;
-  caps.c1 = c.select(1, 0) + slope * v.t;
-  caps.c2 = c.select(1, 1) - rest;
-  caps.share =
-      1 / (1 + (sinh_of(c.select(1, 3)) / mean_square).clamp_min(kernels::kLeastViscosity));
+  caps.c1 = c.select(1, kernels::kCap) + slope * v.t;
+  caps.c2 = c.select(1, kernels::kTraceCap) - rest;
+  caps.viscosity = sinh_of(c.select(1, kernels::kCapViscosity));
+  caps.factor = mean_square * (dt / kernels::kFlowStep);
+  const Tensor exponent = flow_exponent(c.select(1, kernels::kFlowExponent));
+  caps.exponent = torch::where(caps.c1 > 0, exponent, torch::ones_like(exponent));
   return caps;
 }
 
@@ -162,24 +150,38 @@ Tensor isotropic_stress(const LearnedNetworks& law, const Tensor& H, const Tenso
   constexpr double d = kernels::kInvariantSmoothing;
   const Invariants v = invariants(H, strain_scale(z));
   const Tensor D = symmetric(C) * kernels::kTimeScale, D_dev = deviator(D), D_trace = trace_of(D);
-  const Tensor n = (contract(D_dev, D_dev) + d * d).sqrt() - d;
+  const Tensor rate_square = contract(D_dev, D_dev), n = (rate_square + d * d).sqrt() - d;
   const Tensor x = contract(v.W, D_dev) / (1 + n * v.q);
   const Tensor f = network(law, law.stress, torch::stack({v.t, v.q, v.cubic, D_trace, n, x}, 1), z);
-  const Tensor rest = at_rest(law, law.stress, z).select(1, 1);
-  const auto output = [&f](int k) { return f.select(1, k); };  // k̃, a₀, ã₁, a₂, b̃, n, γ, δ
-  const Tensor e = strain_scale(z);
-  const Tensor volume = volume_measure(trace_of(H), exponent_of(output(6)), exponent_of(output(7)));
-  const Tensor pressure = sinh_of(output(0)) * volume / e + (output(1) - rest);
-  const Tensor in_units_of_s =
-      at_matrix(pressure) * identity(H) +
-      at_matrix(sinh_of(output(2)) / e) * seth_hill_measure(H, exponent_of(output(5))) +
-      at_matrix(output(3) / (1 + v.q)) * deviator(v.W.matmul(v.W)) +
-      at_matrix(sinh_of(output(4))) * D;
+  const Tensor rest = at_rest(law, law.stress, z).select(1, kernels::kPressure);
+  const auto output = [&f](kernels::StressOutput k) { return f.select(1, k); };
+  const auto exponent = [&](kernels::StressOutput k) {
+    return bounded(output(k), kernels::kExponentLimit);
+  };
+  const Tensor e = strain_scale(z), t = trace_of(H), b = sinh_of(output(kernels::kViscosity));
+  const Tensor volume =
+      strain_measure(t, exponent(kernels::kVolumeGamma), exponent(kernels::kVolumeDelta));
+  const Tensor pressure = sinh_of(output(kernels::kBulk)) * volume / e +
+                          (output(kernels::kPressure) - rest) +
+                          b * (1 - output(kernels::kBulkRateShare)) * D_trace / 3;
+  const Tensor omega = exponent(kernels::kIsochoricShare);
+  const Tensor X = H - at_matrix(omega * t / 3) * identity(H);
+  const auto term = [&](kernels::StressOutput a, kernels::StressOutput power) {
+    return at_matrix(sinh_of(output(a)) / e) * seth_hill_measure(X, exponent(power));
+  };
+  const Tensor M = term(kernels::kShear, kernels::kShearExponent) +
+                   term(kernels::kSecondShear, kernels::kSecondExponent);
+  const Tensor kappa = bounded(output(kernels::kRateScale), kernels::kRateScaleLimit).exp();
+  const Tensor nu = bounded(output(kernels::kRateExponent), kernels::kRateExponentLimit);
+  const Tensor viscosity =
+      b + sinh_of(output(kernels::kRateViscosity)) * (1 + kappa * kappa * rate_square).pow(nu);
+  const Tensor in_units_of_s = at_matrix(pressure - omega * trace_of(M) / 3) * identity(H) + M +
+                               at_matrix(viscosity) * D_dev;
   return at_matrix(stress_scale(z)) * in_units_of_s;
 }
 
-Tensor learned_project(const LearnedNetworks& law, const Tensor& F, const Tensor& z) {
-  return law.form == LawForm::isotropic ? isotropic_project(law, F, z)
+Tensor learned_project(const LearnedNetworks& law, const Tensor& F, const Tensor& z, double dt) {
+  return law.form == LawForm::isotropic ? isotropic_project(law, F, z, dt)
                                         : published_project(law, F, z);
 }
 

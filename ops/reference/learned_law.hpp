@@ -16,9 +16,9 @@ namespace uniphy::ops::reference {
 torch::Tensor stress_scale(const torch::Tensor& z);
 torch::Tensor strain_scale(const torch::Tensor& z);
 
-/// G(F).
+/// G(F) at a time step dt, s.
 torch::Tensor learned_project(const LearnedNetworks& law, const torch::Tensor& F,
-                              const torch::Tensor& z);
+                              const torch::Tensor& z, double dt = kernels::kFlowStep);
 /// τ(F_proj, C).
 torch::Tensor learned_stress(const LearnedNetworks& law, const torch::Tensor& F_proj,
                              const torch::Tensor& C, const torch::Tensor& z);
@@ -28,12 +28,13 @@ torch::Tensor learned_stress(const LearnedNetworks& law, const torch::Tensor& F_
 
 /// What the projection network says of every particle, each [P].
 struct IsotropicCaps {
-  torch::Tensor c1;     ///< cap of ‖dev H‖ in units of e
-  torch::Tensor c2;     ///< cap of tr H in units of e, min(c₂(rest), 0) taken off
-  torch::Tensor share;  ///< r, of what exceeds the cap of ‖dev H‖ that is taken off
+  torch::Tensor c1;  ///< cap of ‖dev H‖ in units of e
+  torch::Tensor c2;  ///< cap of tr H in units of e, min(c₂(rest), 0) taken off
+  // v, f and p of what stays above the cap of ‖dev H‖ (kept_excess).
+  torch::Tensor viscosity, factor, exponent;
 };
 IsotropicCaps isotropic_caps(const LearnedNetworks& law, const torch::Tensor& H,
-                             const torch::Tensor& z);
+                             const torch::Tensor& z, double dt = kernels::kFlowStep);
 /// τ, given H of the projected F.
 torch::Tensor isotropic_stress(const LearnedNetworks& law, const torch::Tensor& H,
                                const torch::Tensor& C, const torch::Tensor& z);

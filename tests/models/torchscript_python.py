@@ -87,7 +87,7 @@ def check_eager(law, scripts, F, C, z):
 
 def main():
     law = torch.jit.load(sys.argv[1])
-    assert law.version == 2 and law.dtype == "float64"
+    assert law.version == 3 and law.dtype == "float64"
     row = law.materials.index("sand")
     z = law.code_of("sand")
     assert torch.equal(z, law.codes[row]) and z.shape == (law.latent_size,)

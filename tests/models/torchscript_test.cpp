@@ -193,7 +193,11 @@ TEST_P(ScriptLawCase, RunsInPython) {
   if (GetParam().dtype != torch::kFloat64) GTEST_SKIP() << "float64 alone is precise enough";
   // Differentiable at rest.
   auto w = weights();
-  if (w.form == LawForm::isotropic) w = testing::with_caps(w, 1.5, 3);
+  if (w.form == LawForm::isotropic) {
+    w = testing::with_caps(w, 1.5, 3);
+    // Coefficients that spread over decades make stresses that differences cannot resolve.
+    for (double& weight : w.stress.layers.back().weight) weight *= 0.1;
+  }
   save_script_law(file("law.pt"), w, GetParam().dtype, some_codes(w.latent_size));
   const std::string command =
       std::string("PYTHONDONTWRITEBYTECODE=1 " UNIPHY_PYTHON " " UNIPHY_SOURCE_DIR) +
@@ -254,7 +258,7 @@ TEST_F(ScriptLawErrors, WrongAttributes) {
   EXPECT_EQ(after([](auto& m) { m.setattr("format", std::string("other")); }),
             prefix() + "attribute format: expected \"uniphy-torchscript-law\", found \"other\"");
   EXPECT_EQ(after([](auto& m) { m.setattr("version", 1); }),
-            prefix() + "attribute version: expected 2, found 1; export the model again");
+            prefix() + "attribute version: expected 3, found 1; export the model again");
   EXPECT_EQ(after([](auto& m) { m.setattr("units", std::string("tau: kPa")); }),
             prefix() +
                 "attribute units: expected \"F: 1, C: 1/s, z: 1, tau: Pa\", found \"tau: "
@@ -323,7 +327,7 @@ TEST_F(ScriptLawErrors, ALawWithoutItsMethods) {
   for (const char* name : {"materials", "parameter_names", "parameter_units"})
     bare.register_attribute(name, whole.type()->findAttribute(name), whole.attr(name));
   for (const auto& buffer : whole.named_buffers()) bare.register_buffer(buffer.name, buffer.value);
-  bare.define("def project(self, F: Tensor, z: Tensor) -> Tensor:\n    return F\n");
+  bare.define("def project(self, F: Tensor, z: Tensor, dt: float) -> Tensor:\n    return F\n");
   bare.save(file("law.pt").string());
   EXPECT_EQ(message_of([this] { load_script_law(file("law.pt")); }),
             prefix() + "method stress: expected to be there, found none");

@@ -47,7 +47,7 @@ class Errors(unittest.TestCase):
             (lambda: ops.learned_law(F, F, z, **dict(networks, form="round")),
              "learned_law: expected a form of the law from isotropic, published, found \"round\""),
             (lambda: ops.learned_project(F, z, **dict(networks, projection=z)),
-             "learned_project: projection: expected [108] Double on cpu, found [5] Double on cpu"),
+             "learned_project: projection: expected [117] Double on cpu, found [5] Double on cpu"),
             (lambda: ops.learned_stress(F, F, z, **dict(networks, stress_widths=[11])),
              "learned_stress: stress_widths: expected two or more, found 1"),
             (lambda: ops.learned_law(F, F, z[:4], **networks), "projection.widths: expected "

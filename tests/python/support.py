@@ -51,7 +51,7 @@ def random_networks(form, latent_size, width=8, seed=1):
     """Untrained networks of a learned law, as the keywords that ops take."""
     torch.manual_seed(seed)
     projection_in, projection_out, stress_in, stress_out = {
-        "isotropic": (3, 4, 6, 8), "published": (30, 9, 25, 9)}[form]
+        "isotropic": (3, 5, 6, 14), "published": (30, 9, 25, 9)}[form]
 
     def numbers(widths):
         parts = []

@@ -5,6 +5,7 @@
 #include <random>
 #include <vector>
 
+#include "ops/kernels/learned/learned_law_weights.hpp"
 #include "ops/kernels/loss/sample_columns.hpp"
 
 namespace uniphy::testing {
@@ -16,7 +17,7 @@ struct LawLossCase {
   bool state_caps, state_moduli;
   std::vector<double> columns;     ///< [table, SampleColumns::count]
   std::vector<std::int64_t> rows;  ///< [trajectories, samples]
-  std::vector<double> scales;      ///< [trajectories, 3]
+  std::vector<double> scales;      ///< [trajectories, 4]
   std::vector<double> z;           ///< [trajectories, latent]
   std::vector<double> caps, caps_rest, moduli, moduli_rest;
   double floor = 0.1, delta = 1e-3;
@@ -58,17 +59,18 @@ inline LawLossCase law_loss_case(std::int64_t trajectories, std::int64_t samples
   for (std::int64_t k = 0; k < trajectories * samples; ++k)
     c.rows.push_back(std::int64_t(random() % std::uint64_t(c.table)));
   for (std::int64_t i = 0; i < trajectories; ++i) {
-    c.scales.insert(c.scales.end(), {3e3, 0.1, i % 2 ? 0 : 0.05});  // every other one: elastic
+    c.scales.insert(c.scales.end(),
+                    {3e3, 0.1, i % 2 ? 0 : 0.05, i % 3 ? 0.4 : 2});  // every other one: elastic
     for (std::int64_t k = 0; k < c.latent; ++k) c.z.push_back(0.3 * normal(random));
   }
   const auto fill = [&](std::vector<double>& to, std::int64_t count, std::int64_t outputs) {
     for (std::int64_t k = 0; k < trajectories * count * outputs; ++k)
       to.push_back(0.7 * normal(random));
   };
-  fill(c.caps, state_caps ? samples : 1, 4);
-  fill(c.caps_rest, 1, 4);
-  fill(c.moduli, state_moduli ? samples : 1, 8);
-  fill(c.moduli_rest, 1, 8);
+  fill(c.caps, state_caps ? samples : 1, kernels::kCapOutputs);
+  fill(c.caps_rest, 1, kernels::kCapOutputs);
+  fill(c.moduli, state_moduli ? samples : 1, kernels::kStressOutputs);
+  fill(c.moduli_rest, 1, kernels::kStressOutputs);
   return c;
 }
 

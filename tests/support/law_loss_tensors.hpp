@@ -24,10 +24,12 @@ struct LawLossInputs {
     const std::int64_t n = c.trajectories, m = c.samples;
     batch = {tensor(c.columns, {c.table, kernels::SampleColumns::count}),
              torch::tensor(c.rows, torch::kInt64).view({n, m})};
-    scales = tensor(c.scales, {n, 3});
-    leaves = {tensor(c.z, {n, c.latent}), tensor(c.caps, {n, c.state_caps ? m : 1, 4}),
-              tensor(c.caps_rest, {n, 1, 4}), tensor(c.moduli, {n, c.state_moduli ? m : 1, 8}),
-              tensor(c.moduli_rest, {n, 1, 8})};
+    scales = tensor(c.scales, {n, 4});
+    using kernels::kCapOutputs, kernels::kStressOutputs;
+    leaves = {tensor(c.z, {n, c.latent}), tensor(c.caps, {n, c.state_caps ? m : 1, kCapOutputs}),
+              tensor(c.caps_rest, {n, 1, kCapOutputs}),
+              tensor(c.moduli, {n, c.state_moduli ? m : 1, kStressOutputs}),
+              tensor(c.moduli_rest, {n, 1, kStressOutputs})};
     for (torch::Tensor& t : leaves) t.requires_grad_();
     torch::manual_seed(3);
     seed = torch::randn({n, kernels::kIsotropicLosses}, torch::kFloat64).to(type);

@@ -93,8 +93,9 @@ inline std::vector<RolloutMaterial> rollout_materials() {
     } else {
       // A cap of less than a strain scale that hardly depends on the trace, and a return by a
       // twentieth a step: above the cap, and far from a fluid, throughout.
-      last.bias = {0.7, 5, 0.02, 3.7};
-      weights.stress.layers.back().bias = {2, 0, 2, 0, 0.2, 1, 1, 0};  // stiff: z shows
+      last.bias = {0.7, 5, 0.02, 3.7, 0.1};
+      weights.stress.layers.back().bias = {2, 0,  2,   0.5, 0.2, 1,    1,
+                                           0, -1, 0.3, 0.2, 0.5, -0.2, 0.5};  // stiff: z shows
     }
     law.weights = std::make_shared<kernels::LearnedLawWeights>(weights);
     torch::manual_seed(11);

@@ -12,6 +12,7 @@ namespace uniphy {
 namespace {
 
 constexpr const char* kFormat = "uniphy-model";
+constexpr int kVersion = 2;
 constexpr int kMaximumLayers = 64;
 constexpr std::int64_t kMaximumLatent = 4096;
 
@@ -90,7 +91,7 @@ void write_model(const std::filesystem::path& file, const ModelFile& model, bool
   }
   hdf5::Writer writer(file);
   writer.attribute("/", "format", kFormat);
-  writer.attribute("/", "version", 1);
+  writer.attribute("/", "version", kVersion);
   writer.attribute("/", "form", kernels::form_name(weights.form));
   writer.attribute("/", "latent_size", weights.latent_size);
   writer.attribute("/", "activation", kernels::activation_name(weights.activation));
@@ -122,7 +123,11 @@ void write_model(const std::filesystem::path& file, const ModelFile& model, bool
 
 ModelFile read_model(const std::filesystem::path& file) {
   const hdf5::Reader reader(file);
-  reader.check_format(kFormat, 1);
+  const std::int64_t version = reader.check_format(kFormat, kVersion);
+  if (version < kVersion) {  // whose networks answer with other numbers
+    reader.fail("attribute version",
+                fmt::format("expected {}, found {}; train the model again", kVersion, version));
+  }
   expect_text(reader, "stress_units", "Pa");
   expect_text(reader, "rate_units", "1/s");
   const std::string dtype = reader.attribute_text("/", "dtype");

@@ -2,7 +2,7 @@
 
 // model.h5: a trained law and the latent codes of the trajectories it was trained on.
 //
-//   attributes  format = "uniphy-model", version = 1, form = "isotropic" | "published",
+//   attributes  format = "uniphy-model", version = 2, form = "isotropic" | "published",
 //               latent_size, activation = "gelu" | "silu" | "squareplus", dtype = "float64",
 //               stress_units = "Pa", rate_units = "1/s", config = YAML that trained it,
 //               training_dt [2] = shortest and longest time step (s) of the training trajectories;

@@ -8,9 +8,10 @@
 namespace uniphy {
 
 bool flows_by_steps(const kernels::LawDescription& law) {
-  if (law.id != kernels::LawId::learned) return false;
+  if (law.id != kernels::LawId::learned || law.weights->form == kernels::LawForm::isotropic)
+    return false;
   const auto kernel = kernels::make_law<double>(law);
-  constexpr double kDt = 1e-4;  // s; no learned law sees it
+  constexpr double kDt = 1e-4;  // s; the published form does not see it
   constexpr double kRest[9] = {};
   for (const double strain : {0.003, 0.01, 0.03, 0.1, 0.2}) {
     for (const double sign : {-1.0, 1.0}) {

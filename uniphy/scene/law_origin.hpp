@@ -21,10 +21,10 @@ struct LawOrigin {
 };
 
 /// True where the law takes a strain back by a share in each step, so that its rate of flow goes
-/// with the time step that its data had. Only learned laws can: analytic ones know the step. Found
-/// by projecting strained states twice: a return at a rate goes on in the second projection, one to
-/// a yield surface has arrived. Strains up to 0.2 are looked at; at 0.3 caps that training put out
-/// of the reach of its elastic samples begin to count.
+/// with the time step that its data had. Only the published form of a learned law can: the others
+/// know the step. Found by projecting strained states twice: a return at a rate goes on in the
+/// second projection, one to a yield surface has arrived. Strains up to 0.2 are looked at; at 0.3
+/// caps that training put out of the reach of its elastic samples begin to count.
 bool flows_by_steps(const kernels::LawDescription& law);
 
 /// The factor by which dt (s) is off `range`, ≥ 1; 1 inside of it, or where it is not known.
@@ -37,8 +37,8 @@ double nearest_step(const std::array<double, 2>& range, double dt);
 std::optional<std::string> time_step_warning(const kernels::LawDescription& law,
                                              const LawOrigin& origin, double dt);
 
-/// A learned law that flows_by_steps: its viscosity goes with the step, and a tenth is what the
-/// worst codes of held-out materials are off themselves.
+/// A law that flows_by_steps: its viscosity goes with the step, and a tenth is what the worst codes
+/// of held-out materials are off themselves.
 inline constexpr double kStepOfFlow = 1.1;
 /// Any fitted law: the transfer between particles and grid damps at every step. The rebound of an
 /// elastic cube is 0.514, 0.496, 0.476, 0.459 m at 4e-4, 2e-4, 1e-4, 5e-5 s (README): a halving is

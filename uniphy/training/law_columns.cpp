@@ -128,6 +128,7 @@ LawColumns law_columns(const Dataset& data, kernels::LawForm form) {
       sums.add(sample);
     }
     result.scales[i] = sums.scale(data.first[i + 1] - data.first[i]);
+    result.scales[i].flow_time = kernels::kFlowStep / data.trajectories[i].dt;
   }
   return result;
 }

@@ -22,11 +22,12 @@ struct PublishedColumns {
   };
 };
 
-/// The scales that a trajectory's errors are measured by.
+/// The scales that a trajectory's errors are measured by, and its time step.
 struct TrajectoryScale {
-  double stress = 0;    ///< RMS of ‖τ‖, Pa
-  double strain = 0;    ///< RMS of ‖ε‖ of the projected F
-  double decrease = 0;  ///< RMS of the strain that the projection takes; 0 where it takes none
+  double stress = 0;     ///< RMS of ‖τ‖, Pa
+  double strain = 0;     ///< RMS of ‖ε‖ of the projected F
+  double decrease = 0;   ///< RMS of the strain that the projection takes; 0 where it takes none
+  double flow_time = 1;  ///< kernels::kFlowStep over the time step
 };
 
 /// A data set as the objective sees it.

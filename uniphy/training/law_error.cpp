@@ -43,6 +43,7 @@ std::vector<LawError> law_errors(const Dataset& data,
     const double of_projection = kernels::squared_distance(projected.data(), F_proj, 9 * count);
     const double change = kernels::squared_distance(F_proj, F, 9 * count);
     errors[i].stress = std::sqrt(of_stress / std::max(stress_size, 1e-300));
+    errors[i].projects = change > 0;
     errors[i].projection = change > 0 ? std::sqrt(of_projection / change)
                                       : std::sqrt(of_projection / double(9 * count));
   }
@@ -50,9 +51,10 @@ std::vector<LawError> law_errors(const Dataset& data,
 }
 
 void report_errors(const Dataset& data, const std::vector<double>& values, const std::string& name,
-                   Metrics& metrics) {
+                   Metrics& metrics, const std::vector<bool>& rows) {
   std::map<std::string, std::vector<double>> of;
   for (std::size_t i = 0; i < values.size(); ++i) {
+    if (!rows.empty() && !rows[i]) continue;
     // A NaN has no place in an order.
     of[data.trajectories[i].material].push_back(
         std::isfinite(values[i]) ? values[i] : std::numeric_limits<double>::infinity());
@@ -66,12 +68,16 @@ void report_errors(const Dataset& data, const std::vector<double>& values, const
 void report_law_errors(const Dataset& data, const std::vector<LawError>& errors,
                        const std::string& prefix, Metrics& metrics) {
   std::vector<double> stress, projection;
+  std::vector<bool> projects, others;
   for (const LawError& e : errors) {
     stress.push_back(e.stress);
     projection.push_back(e.projection);
+    projects.push_back(e.projects);
+    others.push_back(!e.projects);
   }
   report_errors(data, stress, prefix + "stress_error", metrics);
-  report_errors(data, projection, prefix + "projection_error", metrics);
+  report_errors(data, projection, prefix + "projection_error", metrics, projects);
+  report_errors(data, projection, prefix + "unprojected_error", metrics, others);
 }
 
 }  // namespace uniphy

@@ -21,6 +21,7 @@ struct LawErrors {
   // taken off, and the share that is (formulas: ops/kernels/loss/law_losses_table.hpp).
   torch::Tensor whole_loss;
   torch::Tensor share;
+  torch::Tensor power;  ///< p̃², of the power of the excess that the rate of flow goes with
   // The squared errors themselves, for reports: they have no gradient.
   torch::Tensor stress;
   torch::Tensor projection;
@@ -68,7 +69,7 @@ class Objective {
   ops::ErrorMeasure measure_;
   ObjectiveOps ops_;
   torch::Tensor columns_;  ///< [S, columns]
-  torch::Tensor scales_;   ///< [N, 3]: stress, strain, decrease
+  torch::Tensor scales_;   ///< [N, 4]: stress, strain, decrease, flow_time
 };
 
 /// Of a report: the median over trajectories of the root of squared errors, [N].

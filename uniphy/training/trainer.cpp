@@ -20,6 +20,10 @@
 namespace uniphy {
 namespace {
 
+/// From this part of the steps on the law is judged as it is, for those that return the whole way,
+/// too: what is left of their share is worth more than the pull to 1 says.
+constexpr double kActualFrom = 0.9;
+
 using torch::Tensor;
 
 constexpr std::int64_t kReportEvery = 100;
@@ -89,7 +93,10 @@ TrainingResult train(const Dataset& data, const TrainingOptions& o,
     set_rate(optimizer, 0, warm_cosine(o.learning_rate, step, o.steps));
     set_rate(optimizer, 1, warm_cosine(o.learning_rate * o.latent_rate, step, o.steps));
     const bool caps_first = double(step) < o.caps_share * double(o.steps);
-    const ReturnStage stage = caps_first ? ReturnStage::whole : ReturnStage::either;
+    const bool last = double(step) >= kActualFrom * double(o.steps);
+    const ReturnStage stage = caps_first ? ReturnStage::whole
+                              : last     ? ReturnStage::actual
+                                         : ReturnStage::either;
     const TrainingStep now = training_step(
         objective, result.model, sampler.rows(step, o.batch_per_trajectory), stage, o, optimizer);
     if (step % kReportEvery == 0 || step + 1 == o.steps) {

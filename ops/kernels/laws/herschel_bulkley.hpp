@@ -1,5 +1,6 @@
 #pragma once
 
+#include "ops/kernels/laws/power_flow.hpp"
 #include "ops/kernels/laws/return_map.hpp"
 
 namespace uniphy::kernels {
@@ -16,32 +17,24 @@ struct HerschelBulkley {
   template <class V>
   struct Flow {
     V excess, p, log_ratio;  ///< log_ratio = log(e/η)
-    V x, log_x;
+    V x, log_x, slope;       ///< slope: dy/de of y = x e
   };
   template <class V>
   static UNIPHY_INLINE Flow<V> flow(const HenckyStrain<V>& h, const MaskOf<V>& yields,
                                     const Material<V>& m) {
     using T = ScalarOf<V>;
-    const V zero(T(0)), one(T(1)), two_mu = m.mu + m.mu;
+    const V one(T(1)), two_mu = m.mu + m.mu;
     Flow<V> f;
     f.excess = select<V>(yields, two_mu * h.norm - m.tau_y, one);
     f.p = one / m.n;
     f.log_ratio = lane_log(f.excess / m.eta);
     const V log_A = lane_log(two_mu * m.dt / f.excess) + f.p * f.log_ratio;
-    // With w = log x: log(e^w + A e^{pw}) = 0, a convex, increasing function of w, for which
-    // Newton's method converges from above without a step too far. It starts less than log 2 above.
-    V w = lane_min(zero, -log_A / f.p);
-    for (int i = 0; i < kSteps; ++i) {
-      const V a = lane_exp(w), b = lane_exp(lane_fma(f.p, w, log_A)), sum = a + b;
-      w = lane_min(zero, w - lane_log(sum) * sum / lane_fma(f.p, b, a));
-    }
-    f.log_x = w;
-    f.x = lane_exp(w);
+    const PowerFlow<V> flow = power_flow(f.p, log_A);
+    f.x = flow.share;
+    f.log_x = flow.log_share;
+    f.slope = flow.slope;
     return f;
   }
-  /// Convergence is quadratic; for p from 0.1 to 10 five steps are enough for float64.
-  static constexpr int kSteps = 7;
-
   template <class V>
   static UNIPHY_INLINE ReturnMap<V> map(const HenckyStrain<V>& h, const Material<V>& m) {
     using T = ScalarOf<V>;
@@ -70,8 +63,7 @@ struct HerschelBulkley {
     const Flow<V> f = flow(h, r.yields, m);
     const V per_q = grad_scale / select<V>(r.yields, h.norm, one);  // by the norm after the step
     const V of_y = per_q / two_mu;
-    const V rest = (one - f.x) / f.x;
-    const V of_e = of_y / lane_fma(f.p, rest, one);
+    const V of_e = of_y * f.slope;
     const V of_rate = -of_e * f.excess * (one - f.x);
     strain.add_norm(h, of_e * two_mu - per_q * r.scale);
     g.tau_y = g.tau_y + of_y - of_e;

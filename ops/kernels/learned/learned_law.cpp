@@ -85,8 +85,8 @@ class LearnedLawKernel final : public LawKernel<T> {
     if (law_.form == LawForm::isotropic) {
       rest_projection_ = at_rest(law_.projection);
       rest_stress_ = at_rest(law_.stress);
-      law_.rest_cap = std::min(rest_projection_[kTile], T(0));
-      law_.rest_pressure = rest_stress_[kTile];
+      law_.rest_cap = std::min(rest_projection_[kTraceCap * kTile], T(0));
+      law_.rest_pressure = rest_stress_[kPressure * kTile];
       if (packed_->projection_ignores_state) law_.constant_projection = rest_projection_.data();
       if (packed_->stress_ignores_state) law_.constant_stress = rest_stress_.data();
     }
@@ -137,7 +137,7 @@ class LearnedLawKernel final : public LawKernel<T> {
     stress_.add_weight_gradient(of_stress, gradient + projection_.packed().weight_size());
   }
 
-  void evaluate(std::ptrdiff_t count, T, View<const T> F_trial, View<const T> C, View<T> F_proj,
+  void evaluate(std::ptrdiff_t count, T dt, View<const T> F_trial, View<const T> C, View<T> F_proj,
                 View<T> tau, const LawMemory<T>&) const override {
     T* planes = scratch_of_thread<T>(4 * kPlanesOfTile + table_.scratch(law_));
     T* scratch = planes + 4 * kPlanesOfTile;
@@ -145,7 +145,7 @@ class LearnedLawKernel final : public LawKernel<T> {
       const std::ptrdiff_t n = std::min(kTile, count - p);
       const PlaneOutput<T> F_out(F_proj.from(p), planes + 2 * kPlanesOfTile);
       const PlaneOutput<T> tau_out(tau.from(p), planes + 3 * kPlanesOfTile);
-      table_.evaluate(law_, n, planes_of<T>(F_trial.from(p), n, planes),
+      table_.evaluate(law_, flow_time(dt), n, planes_of<T>(F_trial.from(p), n, planes),
                       planes_of<T>(C.from(p), n, planes + kPlanesOfTile), F_out.view(),
                       tau_out.view(), scratch);
       F_out.finish(n);
@@ -153,7 +153,7 @@ class LearnedLawKernel final : public LawKernel<T> {
     }
   }
 
-  void adjoint(std::ptrdiff_t count, T, View<const T> F_trial, View<const T> C,
+  void adjoint(std::ptrdiff_t count, T dt, View<const T> F_trial, View<const T> C,
                View<const T> grad_F_proj, View<const T> grad_tau, View<T> grad_F_trial,
                View<T> grad_C, T* accumulator, T* weight_sums,
                const LawMemoryAdjoint<T>&) const override {
@@ -164,7 +164,7 @@ class LearnedLawKernel final : public LawKernel<T> {
       const auto of = [planes](int k) { return planes + k * kPlanesOfTile; };
       const PlaneOutput<T> F_out(grad_F_trial.from(p), of(4)), C_out(grad_C.from(p), of(5));
       if (!C_out.direct()) planes_of<T>(grad_C.from(p), n, of(5));  // it is added to
-      table_.adjoint(law_, n, planes_of<T>(F_trial.from(p), n, of(0)),
+      table_.adjoint(law_, flow_time(dt), n, planes_of<T>(F_trial.from(p), n, of(0)),
                      planes_of<T>(C.from(p), n, of(1)), planes_of<T>(grad_F_proj.from(p), n, of(2)),
                      planes_of<T>(grad_tau.from(p), n, of(3)), F_out.view(), C_out.view(),
                      accumulator, weight_sums, scratch);
@@ -174,6 +174,8 @@ class LearnedLawKernel final : public LawKernel<T> {
   }
 
  private:
+  static T flow_time(T dt) { return dt > 0 ? T(kFlowStep / double(dt)) : T(1); }
+
   /// The outputs of a network at rest, [out, kTile], from the very kernel that the roll-out uses,
   /// so that what is taken off is exact there.
   AlignedBuffer<T> at_rest(const PackedMlp<T>& net) const {
@@ -201,12 +203,12 @@ class LearnedLawKernel final : public LawKernel<T> {
   std::vector<T> stress_outputs(const T* accumulator) const {
     std::vector<T> outputs(accumulator + law_.coefficient_sums(),
                            accumulator + law_.accumulator_size());
-    outputs[1] += accumulator[law_.scale_sums() + 2];
+    outputs[kPressure] += accumulator[law_.scale_sums() + 2];
     return outputs;
   }
   std::vector<T> projection_outputs(const T* accumulator) const {
     std::vector<T> outputs(accumulator + law_.cap_sums(), accumulator + law_.coefficient_sums());
-    if (law_.rest_cap < 0) outputs[1] += accumulator[law_.scale_sums() + 3];
+    if (law_.rest_cap < 0) outputs[kTraceCap] += accumulator[law_.scale_sums() + 3];
     return outputs;
   }
   /// Adds the gradient of the first weight of a network that answers to z alone: that of its first

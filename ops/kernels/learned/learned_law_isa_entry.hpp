@@ -14,21 +14,22 @@ std::ptrdiff_t learned_scratch(const LearnedLaw<T>& law) {
   return law.form == LawForm::isotropic ? isotropic_scratch(law) : published_scratch(law);
 }
 template <class T>
-void learned_evaluate(const LearnedLaw<T>& law, std::ptrdiff_t count, View<const T> F_trial,
-                      View<const T> C, View<T> F_proj, View<T> tau, T* scratch) {
+void learned_evaluate(const LearnedLaw<T>& law, T flow_time, std::ptrdiff_t count,
+                      View<const T> F_trial, View<const T> C, View<T> F_proj, View<T> tau,
+                      T* scratch) {
   if (law.form == LawForm::isotropic)
-    isotropic_evaluate(law, count, F_trial, C, F_proj, tau, scratch);
+    isotropic_evaluate(law, flow_time, count, F_trial, C, F_proj, tau, scratch);
   else
     published_evaluate(law, count, F_trial, C, F_proj, tau, scratch);
 }
 template <class T>
-void learned_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, View<const T> F_trial,
-                     View<const T> C, View<const T> grad_F_proj, View<const T> grad_tau,
-                     View<T> grad_F_trial, View<T> grad_C, T* accumulator, T* weight_sums,
-                     T* scratch) {
+void learned_adjoint(const LearnedLaw<T>& law, T flow_time, std::ptrdiff_t count,
+                     View<const T> F_trial, View<const T> C, View<const T> grad_F_proj,
+                     View<const T> grad_tau, View<T> grad_F_trial, View<T> grad_C, T* accumulator,
+                     T* weight_sums, T* scratch) {
   if (law.form == LawForm::isotropic)
-    isotropic_adjoint(law, count, F_trial, C, grad_F_proj, grad_tau, grad_F_trial, grad_C,
-                      accumulator, weight_sums, scratch);
+    isotropic_adjoint(law, flow_time, count, F_trial, C, grad_F_proj, grad_tau, grad_F_trial,
+                      grad_C, accumulator, weight_sums, scratch);
   else
     published_adjoint(law, count, F_trial, C, grad_F_proj, grad_tau, grad_F_trial, grad_C,
                       accumulator, weight_sums, scratch);

@@ -52,11 +52,11 @@ template <class T>
 struct LearnedLawTable {
   /// Scratch numbers of evaluate and adjoint.
   std::ptrdiff_t (*scratch)(const LearnedLaw<T>&);
-  /// LawKernel::evaluate of at most kTile particles.
-  void (*evaluate)(const LearnedLaw<T>&, std::ptrdiff_t count, View<const T> F_trial,
+  /// LawKernel::evaluate of at most kTile particles; flow_time: kFlowStep over the time step.
+  void (*evaluate)(const LearnedLaw<T>&, T flow_time, std::ptrdiff_t count, View<const T> F_trial,
                    View<const T> C, View<T> F_proj, View<T> tau, T* scratch);
   /// LawKernel::adjoint of at most kTile particles; grad_F_proj and grad_tau must be given.
-  void (*adjoint)(const LearnedLaw<T>&, std::ptrdiff_t count, View<const T> F_trial,
+  void (*adjoint)(const LearnedLaw<T>&, T flow_time, std::ptrdiff_t count, View<const T> F_trial,
                   View<const T> C, View<const T> grad_F_proj, View<const T> grad_tau,
                   View<T> grad_F_trial, View<T> grad_C, T* accumulator, T* weight_sums, T* scratch);
   /// A bare network on one tile of planes: in [padded(in), kTile] → [padded(out), kTile] in

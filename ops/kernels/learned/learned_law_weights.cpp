@@ -115,7 +115,7 @@ std::shared_ptr<const LearnedLawWeights> without_projection(const LearnedLawWeig
   r->stress = weights.stress;
   r->projection = constant_network(shape.projection_in + weights.latent_size,
                                    weights.form == LawForm::isotropic
-                                       ? std::vector<double>{1e30, 1e30, 0.0, 0.0}
+                                       ? std::vector<double>{1e30, 1e30, 0.0, 0.0, 0.0}
                                        : std::vector<double>(shape.projection_out, 0.0));
   return r;
 }

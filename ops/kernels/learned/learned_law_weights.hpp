@@ -36,12 +36,41 @@ enum class LawForm {
 const char* form_name(LawForm form);
 LawForm form_from_name(const std::string& name);
 
+/// What the two networks of the isotropic form answer with (formulas: isotropic_law.hpp), in the
+/// order of their outputs.
+enum CapOutput {
+  kCap,           ///< c₀
+  kTraceCap,      ///< c₂
+  kCapSlope,      ///< m
+  kCapViscosity,  ///< η̃
+  kFlowExponent,  ///< p̃
+  kCapOutputs
+};
+enum StressOutput {
+  kBulk,            ///< k̃
+  kPressure,        ///< a₀
+  kShear,           ///< ã₁
+  kSecondShear,     ///< ã₂
+  kViscosity,       ///< b̃
+  kShearExponent,   ///< n₁
+  kVolumeGamma,     ///< γ
+  kVolumeDelta,     ///< δ
+  kSecondExponent,  ///< n₂
+  kIsochoricShare,  ///< ω
+  kRateViscosity,   ///< b̃₁
+  kRateScale,       ///< κ̃
+  kRateExponent,    ///< ν
+  kBulkRateShare,   ///< β
+  kStressOutputs
+};
+
 /// The numbers of features, before z, that enter the two networks, and of their outputs.
 struct NetworkShape {
   int projection_in, projection_out, stress_in, stress_out;
 };
 constexpr NetworkShape network_shape(LawForm form) {
-  return form == LawForm::isotropic ? NetworkShape{3, 4, 6, 8} : NetworkShape{30, 9, 25, 9};
+  return form == LawForm::isotropic ? NetworkShape{3, kCapOutputs, 6, kStressOutputs}
+                                    : NetworkShape{30, 9, 25, 9};
 }
 
 template <class T>
@@ -105,7 +134,10 @@ inline constexpr double kStrainRate = 2.0;
 inline constexpr double kTimeScale = 0.05;           ///< s, D = sym(C) kTimeScale
 inline constexpr double kInvariantSmoothing = 0.05;  ///< d: rounds the kink of the norms at 0
 inline constexpr double kSinhLimit = 12;             ///< of outputs whose sinh is a coefficient
-inline constexpr double kLeastViscosity = -0.2;  ///< of sinh(η̃)/b̄: the share is at most 1.25
+inline constexpr double kFlowStep = 2e-4;        ///< s, the time step that sinh(η̃) belongs to
+inline constexpr double kLeastViscosity = -0.2;  ///< of v Δt₀/(b̄ Δt): the share is at most 1.25
+inline constexpr double kRateScaleLimit = 6;     ///< of κ̃
+inline constexpr double kRateExponentLimit = 2;  ///< of ν
 inline constexpr double kExponentLimit = 4;  ///< of outputs that are exponents of strain measures
 inline constexpr double kFluidCap = -0.5;    ///< c₁ below which a material has no strength at all
 

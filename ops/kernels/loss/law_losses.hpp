@@ -22,8 +22,11 @@ struct ProjectionErrors {
   V cap_q, cap_t;           ///< Q, T
   MaskOf<V> cuts, to_zero;  ///< the law cuts ‖ε̂‖ to something, to 0
   MaskOf<V> cuts_trace;
+  ReturnShare<V> share;         ///< r
   V missed_weight;              ///< max(r, 0.05)
-  V partial, whole;             ///< a(r), a(1)
+  KeptExcess<V> kept;           ///< y, in units of e
+  V excess;                     ///< x, likewise
+  V partial, whole;             ///< a, and a with y = 0
   V above, of_fluid, of_trace;  ///< the parts of o
   V inverse_size2;
   V error, error_whole;
@@ -45,14 +48,16 @@ UNIPHY_INLINE ProjectionErrors<V> projection_errors(const IsotropicAnswers<T>& a
   p.cuts_trace = sample[Column::trace_yields] > half;
   const V norm_decrease = sample[Column::norm_decrease];
   const V trace_decrease = sample[Column::trace_decrease];
-  p.missed_weight = lane_max(V(T(kLeastShare)), p.cap.share);
+  p.share = return_share(p.cap);
+  p.missed_weight = lane_max(V(T(kLeastShare)), p.share.value);
   const V missed = lane_max(zero, norm - p.cap_q) * p.missed_weight;
-  const auto of_norm = [&](const V& r) {
-    return select<V>(p.to_zero, norm - r * (norm - lane_max(zero, p.cap_q)),
-                     select<V>(p.cuts, r * (norm - p.cap_q) - norm_decrease, missed));
-  };
-  p.partial = of_norm(p.cap.share);
-  p.whole = of_norm(one);
+  const V cap_q = select<V>(p.to_zero, lane_max(zero, p.cap_q), p.cap_q), over = norm - cap_q;
+  p.excess = over * inv_e;
+  p.kept = kept_excess<V>(p.excess, p.cap);
+  const V kept = e * p.kept.value;
+  p.partial =
+      select<V>(p.to_zero, cap_q + kept, select<V>(p.cuts, over - kept - norm_decrease, missed));
+  p.whole = select<V>(p.to_zero, cap_q, select<V>(p.cuts, over - norm_decrease, missed));
   p.above = select<V>(p.cuts, lane_max(zero, p.cap_q - norm + norm_decrease), zero);
   const auto fluid = p.to_zero && !p.cuts_trace;
   p.of_fluid = select<V>(
@@ -85,10 +90,10 @@ UNIPHY_INLINE StressErrors<V> stress_errors(const IsotropicAnswers<T>& a,
   const V s(a.stress_scale);
   StressErrors<V> r;
   r.state = sample_state(sample, inv_e);
-  r.measures = measures(r.state, c);
+  r.measures = measures(r.state, c, inv_e);
   const Vec3<V> diagonal = basis_diagonal(r.state, c, r.measures, inv_e);
   const Mat3<V> tau = sample.symmetric(SampleColumns::stress);
-  Mat3<V> predicted = r.state.rate_frame * c.b.value;
+  Mat3<V> predicted = r.state.rate_frame * r.measures.viscosity;
   for (int i = 0; i < 3; ++i) predicted(i, i) = predicted(i, i) + diagonal[i];
   r.difference = predicted * s - tau;
   r.inverse_size2 = V(T(1)) / (dot(tau, tau) + V(a.stress_floor2 + T(kLeastSize2)));
@@ -109,7 +114,7 @@ UNIPHY_INLINE void load_answers(const T* from, bool of_state, std::ptrdiff_t fir
 template <class V>
 struct AnswerLanes {
   using T = ScalarOf<V>;
-  V moduli[8];
+  V moduli[kStressOutputs];
   CapOutputs<V> caps;
   Coefficients<V> coefficients;
 
@@ -124,9 +129,9 @@ struct AnswerLanes {
 
  private:
   UNIPHY_INLINE void load_caps(const IsotropicAnswers<T>& a, std::ptrdiff_t first) {
-    V o[4];
+    V o[kCapOutputs];
     load_answers(a.caps, a.state_caps, first, a.samples.count, o);
-    caps = cap_outputs(o[0], o[1], o[2], o[3]);
+    caps = cap_outputs(o, V(a.flow_time));
   }
   UNIPHY_INLINE void load_moduli(const IsotropicAnswers<T>& a, std::ptrdiff_t first) {
     load_answers(a.moduli, a.state_moduli, first, a.samples.count, moduli);
@@ -152,7 +157,7 @@ inline void law_losses(const IsotropicAnswers<T>& a, T* means) {
     const ProjectionErrors<V> p = projection_errors<V, T>(a, sample, answers.caps, inv_e);
     add(kProjectionLoss, lane_log1p(p.error * inv_delta));
     add(kWholeLoss, lane_log1p(p.error_whole * inv_delta));
-    add(kShare, p.cap.share);
+    add(kShare, p.share.value);
     add(kProjectionError, p.error);
     const StressErrors<V> s = stress_errors<V, T>(a, sample, answers.coefficients, inv_e);
     add(kStressLoss, lane_log1p(s.error * inv_delta));

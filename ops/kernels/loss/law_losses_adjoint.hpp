@@ -9,7 +9,7 @@ namespace isotropic_detail {
 /// Gradients of one vector of samples.
 template <class V>
 struct CapGradients {
-  V output[4];
+  V output[kCapOutputs];
   V c2, log_e;
 };
 /// per_error, per_whole, per_share: dL/d(error, error_whole, share).
@@ -18,20 +18,21 @@ UNIPHY_INLINE CapGradients<V> projection_errors_adjoint(const ProjectionErrors<V
                                                         const V& per_error, const V& per_whole,
                                                         const V& per_share) {
   using T = ScalarOf<V>;
-  const V zero(T(0)), two(T(2)), norm = p.trial.norm, share = p.cap.share;
+  const V zero(T(0)), one(T(1)), two(T(2)), norm = p.trial.norm;
   const V g_partial = two * p.partial * p.inverse_size2 * per_error;
   const V g_whole = two * p.whole * p.inverse_size2 * per_whole;
   const V g_others = two * p.inverse_size2 * (per_error + per_whole);
 
   // ‖ε̂‖, by what the law does with it. Where it leaves ‖ε̂‖ alone the share's weight is a constant.
   const auto positive = p.cap_q > zero;
-  const V cut_q = lane_fma(g_others, p.above, -lane_fma(g_partial, share, g_whole));
-  const V zero_q = select<V>(positive, lane_fma(g_partial, share, g_whole), zero);
+  const V of_cap = lane_fma(g_partial, one - p.kept.per_excess, g_whole);
+  const V cut_q = lane_fma(g_others, p.above, -of_cap);
+  const V zero_q = select<V>(positive, of_cap, zero);
   const V missed_q = select<V>(norm > p.cap_q, -(p.missed_weight * (g_partial + g_whole)), zero);
   const V g_q = select<V>(p.to_zero, zero_q, select<V>(p.cuts, cut_q, missed_q));
-  const V excess = norm - select<V>(p.to_zero, lane_max(zero, p.cap_q), p.cap_q);
-  const V of_excess = select<V>(p.to_zero, -excess, select<V>(p.cuts, excess, zero));  // da(r)/dr
-  const V g_share = lane_fma(g_partial, of_excess, per_share);
+  // e y, which stays where it cuts to 0 and is not taken off where it cuts to something.
+  const V g_kept = e * select<V>(p.to_zero, g_partial, select<V>(p.cuts, -g_partial, zero));
+  const V g_viscosity = lane_fma(g_kept, p.kept.per_viscosity, per_share * p.share.per_viscosity);
 
   // of_fluid is 0 unless c₁ moves it.
   const V of_fluid = g_others * p.of_fluid * V(T(kFluidWeight)) * norm;
@@ -41,13 +42,15 @@ UNIPHY_INLINE CapGradients<V> projection_errors_adjoint(const ProjectionErrors<V
   const V g_c2 = select<V>(p.cuts_trace, of_trace, -of_trace) * e;
 
   CapGradients<V> g;
-  g.output[0] = g_c1;
-  g.output[1] = g_c2;
-  g.output[2] = g_c1 * p.cap.per_m;
-  g.output[3] = g_share * p.cap.per_viscosity;
+  g.output[kCap] = g_c1;
+  g.output[kTraceCap] = g_c2;
+  g.output[kCapSlope] = g_c1 * p.cap.per_m;
+  g.output[kCapViscosity] = g_viscosity * p.cap.per_viscosity;
+  g.output[kFlowExponent] = g_kept * p.kept.per_exponent * p.cap.per_exponent;
   g.c2 = g_c2;
-  // Q = e c₁ and T = e c₂; c₁ itself sees t/e.
-  g.log_e = g_q * p.cap_q + g_c2 * p.cap.c2 - g_c1 * p.cap.slope * p.trial.trace / e;
+  // Q = e c₁, T = e c₂ and e y(x/e); c₁ itself sees t/e.
+  g.log_e = g_q * p.cap_q + g_c2 * p.cap.c2 - g_c1 * p.cap.slope * p.trial.trace / e +
+            g_kept * (p.kept.value - p.kept.per_excess * p.excess);
   return g;
 }
 
@@ -56,18 +59,10 @@ UNIPHY_INLINE CoefficientGradients<V> stress_errors_adjoint(const IsotropicAnswe
                                                             const StressErrors<V>& r,
                                                             const AnswerLanes<V>& answers,
                                                             const V& inv_e, const V& per_error) {
-  const V zero(T(0));
   const Coefficients<V>& c = answers.coefficients;
   const Mat3<V> S = r.difference * (per_error * r.inverse_size2 * V(T(2) * a.stress_scale));
-  CoefficientGradients<V> g = coefficient_gradients(
-      r.state, c, r.measures, S, dot(S, r.state.rate_frame), answers.moduli, inv_e);
-  // w = ε̂/e enters `second`.
-  V g_q = zero;
-  const Vec3<V> gw = second_gradient(r.state, c.a2, S, g_q);
-  const StrainInvariants<V>& v = r.state.invariants;
-  for (int i = 0; i < 3; ++i)
-    g.log_e = g.log_e - lane_fma(g_q, v.w[i] * v.inverse_root, gw[i]) * v.w[i];
-  return g;
+  return coefficient_gradients(r.state, c, r.measures, S, dot(S, r.state.rate_frame),
+                               answers.moduli, inv_e);
 }
 
 /// Gradients of network outputs: one for each sample, or their sum.
@@ -106,8 +101,8 @@ inline void law_losses_adjoint(const IsotropicAnswers<T>& a, const T* weights,
   using namespace isotropic_detail;
   const V zero(T(0)), e(a.samples.strain_scale), inv_e(T(1) / a.samples.strain_scale);
   const V delta(a.delta);
-  OutputGradients<4, V> of_caps(gradient.caps, a.state_caps);
-  OutputGradients<8, V> of_moduli(gradient.moduli, a.state_moduli);
+  OutputGradients<kCapOutputs, V> of_caps(gradient.caps, a.state_caps);
+  OutputGradients<kStressOutputs, V> of_moduli(gradient.moduli, a.state_moduli);
   V rest_cap = zero, rest_pressure = zero, log_s = zero, log_e = zero;
   AnswerLanes<V> answers(a);
   for (std::ptrdiff_t l = 0; l < a.samples.count; l += width_of<V>) {

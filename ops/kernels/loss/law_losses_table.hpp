@@ -7,14 +7,15 @@
 #include "ops/kernels/simd/dispatch.hpp"
 
 // What Algorithm 1 minimises, for the isotropic form: the errors of caps and moduli (outputs of the
-// two networks, formulas in isotropic_law.hpp) on samples of a trajectory. With r the share, R the
-// trajectory's RMS and f the error floor,
+// two networks, formulas in isotropic_law.hpp) on samples of a trajectory. With r = 1/(1 + v Δt₀/(b̄
+// Δt)), R the trajectory's RMS and f the error floor,
 //   stress error      ‖τ̂ − τ‖²/(‖τ‖² + (f R_τ)²)
-//   projection error  (a(r)² + o²)/(Δq² + Δt²/3 + (f R_Δ)²), Δ the decrease that the law makes of
+//   projection error  (a² + o²)/(Δq² + Δt²/3 + (f R_Δ)²), Δ the decrease that the law makes of
 //                     q = ‖ε̂‖ and t = tr ε (R_Δ of ‖ε‖ itself where a trajectory has none)
 // Which cap is right depends on what the law does with the sample; Q = e c₁, T = e c₂ are the caps:
-//   a(r) = r (q − Q) − Δq             the law cuts q back to something
-//          q − r (q − max(Q, 0))      it cuts q to 0: any cap at or below 0 is right
+//   a    = x − y(x) − Δq, x = q − Q   the law cuts q back to something; y is what stays of x
+//          max(Q, 0) + y(q − max(Q, 0))
+//                                     it cuts q to 0: any cap at or below 0 is right
 //          max(r, 0.05) (q − Q)₊      it leaves q alone: any cap beyond q is right, the less it
 //                                     matters the smaller r, which takes no gradient from it
 //   o²   = (Q − q + Δq)₊²             where it cuts to something: whatever the share, a cap is no
@@ -24,7 +25,7 @@
 //        + ⅓ (T − t')² or ⅓ (t − T)₊² the trace, cut to t' or left alone; a fluid's cap is to lie
 //                                     beyond t + t₊, since the few samples that expand most weigh
 //                                     too little to keep it beyond t
-// "Whole" is a(1) in place of a(r): a law that returns the whole way to the cap.
+// "Whole" is a with y = 0: a law that returns the whole way to the cap.
 
 namespace uniphy::kernels {
 
@@ -41,12 +42,13 @@ struct SampleFeatures {
 template <class T>
 struct IsotropicAnswers {
   SampleFeatures<T> samples;
-  const T* caps;                  ///< [4, count or 1]
-  const T* moduli;                ///< [8, count or 1]
+  const T* caps;                  ///< [kCapOutputs, count or 1]
+  const T* moduli;                ///< [kStressOutputs, count or 1]
   bool state_caps, state_moduli;  ///< whether there is one for each sample
   T rest_cap;                     ///< min(c₂(rest), 0)
   T rest_pressure;                ///< a₀(rest)
   T stress_scale;                 ///< s, Pa
+  T flow_time;                    ///< kFlowStep over the time step of the trajectory
   T stress_floor2;                ///< (f R_τ)²
   T strain_floor2;                ///< (f R_Δ)²
   T delta;                        ///< δ of log(1 + error/δ)

@@ -456,18 +456,18 @@ TEST(LearnedLawOpErrors, NameTheArgument) {
   EXPECT_EQ(spoilt([](LearnedNetworks&) {}), "no error");
   EXPECT_EQ(
       spoilt([](LearnedNetworks& n) { n.stress.widths.back() = 9; }),
-      "learned law: networks.stress.widths: expected [10, ..., 8] (features and latent first, "
+      "learned law: networks.stress.widths: expected [10, ..., 14] (features and latent first, "
       "outputs last), found [10, 8, 9]");
   EXPECT_EQ(
       spoilt([](LearnedNetworks& n) { n.projection.numbers = n.projection.numbers.slice(0, 1); }),
-      "learned law: networks.projection.numbers: expected [100] Float on cpu, found [99] "
+      "learned law: networks.projection.numbers: expected [109] Float on cpu, found [108] "
       "Float on cpu");
   EXPECT_EQ(spoilt([](LearnedNetworks& n) { n.stress.numbers = n.stress.numbers.to(torch::kInt); }),
-            "learned law: networks.stress.numbers: expected a Float or Double tensor, found [160] "
+            "learned law: networks.stress.numbers: expected a Float or Double tensor, found [214] "
             "Int on cpu");
   EXPECT_EQ(
       spoilt([](LearnedNetworks& n) { n.stress.numbers = n.stress.numbers.to(torch::kFloat64); }),
-      "learned law: networks.stress.numbers: expected [160] Float on cpu, found [160] Double "
+      "learned law: networks.stress.numbers: expected [214] Float on cpu, found [214] Double "
       "on cpu");
 }
 

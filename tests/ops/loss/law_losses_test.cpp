@@ -131,28 +131,28 @@ TEST(LawLosses, RefusesWhatDoesNotFit) {
          "expected [any, any] Long");
   expect([](Inputs& in) { in.batch.rows = in.batch.rows.narrow(1, 0, 0); },
          "rows: expected one sample or more");
-  expect([](Inputs& in) { in.scales = torch::zeros({4, 2}); }, "scales: expected [4, 3]");
+  expect([](Inputs& in) { in.scales = torch::zeros({4, 2}); }, "scales: expected [4, 4]");
   expect(
       [](Inputs& in) {
         in.leaves[0] = torch::zeros({4, 1});
       },
       "z: expected 2 numbers or more a trajectory, found 1");
-  expect([](Inputs& in) { in.leaves[1] = torch::zeros({4, 6, 4}); }, "caps: expected [4, 7, 4]");
+  expect([](Inputs& in) { in.leaves[1] = torch::zeros({4, 6, 5}); }, "caps: expected [4, 7, 5]");
   expect(
       [](Inputs& in) {
-        in.leaves[2] = torch::zeros({4, 7, 4});
+        in.leaves[2] = torch::zeros({4, 7, 5});
       },
-      "caps_rest: expected [4, 1, 4]");
+      "caps_rest: expected [4, 1, 5]");
   expect(
       [](Inputs& in) {
-        in.leaves[3] = torch::zeros({4, 7, 8}, torch::kFloat64);
+        in.leaves[3] = torch::zeros({4, 7, 14}, torch::kFloat64);
       },
-      "moduli: expected [4, 7, 8] Float");
+      "moduli: expected [4, 7, 14] Float");
   expect(
       [](Inputs& in) {
         in.leaves[4] = torch::zeros({4, 1, 4});
       },
-      "moduli_rest: expected [4, 1, 8]");
+      "moduli_rest: expected [4, 1, 14]");
 }
 
 }  // namespace

@@ -280,7 +280,7 @@ TEST(Rollout, ErrorsNameTheArgument) {
               b.networks = to_networks(*learned.law.weights, torch::kFloat64);
               b.networks.stress.numbers = b.networks.stress.numbers.slice(0, 1);
             }),
-            "rollout: body 0: networks.stress.numbers: expected [616] Double on cpu, found [615] "
+            "rollout: body 0: networks.stress.numbers: expected [718] Double on cpu, found [717] "
             "Double on cpu");
   EXPECT_THAT(message([](RolloutScene&, RolloutBody& b) { b.end = 100; }),
               HasSubstr("bodies: expected the last one to end at particle 125, found 100"));

@@ -79,10 +79,11 @@ inline ModelFile readable_model(int codes = 8) {
   w.form = kernels::LawForm::isotropic;
   w.latent_size = kLatent;
   const kernels::NetworkShape shape = kernels::network_shape(w.form);
-  auto caps = layer(shape.projection_in, {1.5, 100, 0, 0});  // c₀, c₂ in units of the strain scale
+  auto caps =
+      layer(shape.projection_in, {1.5, 100, 0, 0, 0});  // c₀, c₂ in units of the strain scale
   caps.weight[shape.projection_in + 2] = 2;
   w.projection.layers = {caps};
-  auto stress = layer(shape.stress_in, {1.5, 0, 1.4, 0, 0.2, 0, 0, 0});
+  auto stress = layer(shape.stress_in, {1.5, 0, 1.4, 0, 0.2, 0, 0, 0, 0, 0, 0, 0, 0, 0});
   stress.weight[2 * stress.in + shape.stress_in + 3] = 1;
   w.stress.layers = {stress};
   std::mt19937 random(3);

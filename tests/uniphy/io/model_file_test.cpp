@@ -118,7 +118,7 @@ TEST(ModelFile, WeightsThatDoNotFitAreNotWritten) {
        [](ModelFile& m) { m.weights.projection.layers[0].in = 8; }},
       {"stress/layer_1: expected 6 inputs, found 5",
        [](ModelFile& m) { m.weights.stress.layers[1].in = 5; }},
-      {"stress/layer_2: expected 8 outputs, found 3",
+      {"stress/layer_2: expected 14 outputs, found 3",
        [](ModelFile& m) { m.weights.stress.layers[2].out = 3; }},
       {"stress/layer_0/weight: expected 60 numbers, found 59",
        [](ModelFile& m) { m.weights.stress.layers[0].weight.pop_back(); }},
@@ -152,7 +152,7 @@ constexpr auto kShape = kernels::network_shape(kernels::LawForm::isotropic);
 /// A well-formed small model file, with one thing spoilt.
 struct Layout {
   std::string format = "uniphy-model";
-  int version = 1;
+  int version = 2;
   std::string form = "isotropic";
   std::string activation = "gelu";
   std::string dtype = "float64";
@@ -204,8 +204,8 @@ std::string message_of(const std::function<void(Layout&)>& spoil) {
 TEST(ModelFile, MalformedFilesAreRefused) {
   EXPECT_EQ(message_of([](Layout& l) { l.format = "uniphy-dataset"; }),
             "m.h5: attribute format: expected \"uniphy-model\", found \"uniphy-dataset\"");
-  EXPECT_EQ(message_of([](Layout& l) { l.version = 2; }),
-            "m.h5: attribute version: expected 1, found 2");
+  EXPECT_EQ(message_of([](Layout& l) { l.version = 1; }),
+            "m.h5: attribute version: expected 2, found 1; train the model again");
   EXPECT_EQ(message_of([](Layout& l) { l.form = "neural"; }),
             "m.h5: attribute form: expected a form of the law from isotropic, published, found "
             "\"neural\"");
@@ -225,7 +225,7 @@ TEST(ModelFile, MalformedFilesAreRefused) {
   EXPECT_EQ(message_of([](Layout& l) { l.stress_in = 9; }),
             "m.h5: weights: stress/layer_0: expected 8 inputs (features and latent), found 9");
   EXPECT_EQ(message_of([](Layout& l) { l.bias_size = 1; }),
-            "m.h5: /stress/layer_0/bias: expected the shape [8], found [1]");
+            "m.h5: /stress/layer_0/bias: expected the shape [14], found [1]");
   EXPECT_EQ(message_of([](Layout& l) { l.weight = std::nan(""); }),
             "m.h5: /stress/layer_0/weight: expected finite numbers, found nan at position 0");
   EXPECT_EQ(message_of([](Layout& l) { l.layer_name = "layer_1"; }),

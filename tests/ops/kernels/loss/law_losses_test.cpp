@@ -31,12 +31,12 @@ struct Trajectory {
       for (int k = 0; k < outputs; ++k)
         for (std::int64_t i = 0; i < count; ++i) inputs.push_back(v[i * outputs + k]);
     };
-    append(c.caps, c.state_caps ? c.samples : 1, 4);
-    append(c.moduli, c.state_moduli ? c.samples : 1, 8);
+    append(c.caps, c.state_caps ? c.samples : 1, kCapOutputs);
+    append(c.moduli, c.state_moduli ? c.samples : 1, kStressOutputs);
   }
 
   IsotropicAnswers<T> answers(const std::vector<double>& x) {
-    const std::int64_t split = 4 + (from.state_caps ? from.samples : 1) * 4;
+    const std::int64_t split = 4 + (from.state_caps ? from.samples : 1) * kCapOutputs;
     caps.assign(x.begin() + 4, x.begin() + split);
     moduli.assign(x.begin() + split, x.end());
     IsotropicAnswers<T> a{};
@@ -46,6 +46,7 @@ struct Trajectory {
     a.state_caps = from.state_caps;
     a.state_moduli = from.state_moduli;
     a.stress_scale = T(std::exp(x[0]));
+    a.flow_time = T(from.scales[3]);
     a.rest_cap = T(x[2]);
     a.rest_pressure = T(x[3]);
     a.stress_floor2 = T(9e4);
