@@ -6,7 +6,7 @@ import sys, h5py, torch
 torch.ops.load_library(sys.argv[1])
 model, seen = h5py.File(sys.argv[2]), h5py.File(sys.argv[3])
 tensor = lambda data: torch.tensor(data[:]).float()
-codes, material = tensor(model["latents/z"]), model["latents/material"].asstr()
+codes, material = tensor(model["latents/z"]), model["latents/material"].asstr()[:]
 law = {name: model.attrs[name].decode() for name in ("form", "activation")}
 for name in ("projection", "stress"):  # one tensor: weight and bias of each layer in turn
     layers = [model[name][f"layer_{k}"] for k in range(len(model[name]))]
@@ -32,9 +32,9 @@ with torch.no_grad():
 optimizer = torch.optim.LBFGS([z, motion], max_iter=5, line_search_fn="strong_wolfe")
 def closure():
     optimizer.zero_grad()
-    loss = loss_of(z)
-    loss.backward()
+    (loss := loss_of(z)).backward()
     return loss
 for epoch in range(int(sys.argv[4]) if len(sys.argv) > 4 else 15):
-    mse, nearest = optimizer.step(closure).exp(), (codes - z.detach()).norm(dim=1).argmin().item()
+    mse, away = optimizer.step(closure).exp(), (codes - z.detach()).norm(dim=1).tolist()
+    nearest = min(range(len(away)), key=lambda k: ("random_" in material[k], away[k]))
     print(f"epoch {epoch}: {mse:.2e} m², nearest code {nearest} ({material[nearest]})", flush=True)

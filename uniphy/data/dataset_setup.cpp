@@ -33,6 +33,12 @@ TrajectorySetup setup_of(const Dataset& dataset, std::int64_t trajectory) {
                     trajectory, options.total(), count));
   }
   const TrajectoryRecord& record = dataset.trajectories[static_cast<std::size_t>(trajectory)];
+  if (trajectory >= options.simulated()) {
+    throw Error(
+        fmt::format("data set: trajectory {}: expected one of the {} that were simulated, found a "
+                    "{}, which has no scene",
+                    trajectory, options.simulated(), record.material));
+  }
   TrajectorySetup setup = draw_setup(options, trajectory, record.attempt);
   if (setup.record.material != record.material || setup.record.shape != record.shape ||
       !same_parameters(setup.record.parameters, record.parameters)) {

@@ -53,6 +53,11 @@ std::string samples(const GenerateOptions& o) {
       interval(o.drawn_affine));
 }
 
+std::string random_laws(const GenerateOptions& o) {
+  return fmt::format("random_laws:\n  solids: {}\n  fluids: {}\n  plastics: {}\n", o.random_laws[0],
+                     o.random_laws[1], o.random_laws[2]);
+}
+
 }  // namespace
 
 std::string generate_config(const GenerateOptions& o) {
@@ -61,7 +66,7 @@ std::string generate_config(const GenerateOptions& o) {
   const std::string text =
       fmt::format("seed: {}\nsplit: {}\ntrajectories: {}\nattempts: {}\nmaterials: {}\n", o.seed,
                   split_name(o.split), o.trajectories, o.attempts, names(materials)) +
-      ranges(o) + simulation(o) + bodies(o) + samples(o);
+      ranges(o) + simulation(o) + bodies(o) + samples(o) + random_laws(o);
   // Through the reader once more, for its own way of writing a resolved configuration.
   const Config config = Config::parse(text, "configuration of a data set");
   Section root = config.root();

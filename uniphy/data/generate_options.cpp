@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "ops/kernels/base/error.hpp"
+#include "uniphy/data/random_row.hpp"
 #include "uniphy/geometry/shape_catalogue.hpp"
 #include "uniphy/scene/law_config.hpp"
 
@@ -138,7 +139,34 @@ GenerateOptions read_generate_options(Section& config) {
                     "heldout_materials: new parameters; heldout_all: new shapes and motions too");
   o.split = split_from_name(split);
   read_draw_options(config, o);
+  read_random_laws(config, o);
   return o;
+}
+
+void read_random_laws(Section& config, GenerateOptions& o) {
+  Section s = config.section(
+      "random_laws",
+      "laws drawn at random around the five families answer states of their trajectories");
+  const std::array<std::array<const char*, 2>, 3> keys{
+      {{"solids",
+        "of states of elastic: one to three terms of Ogden's and Seth and Hill's, and an "
+        "equation of state"},
+       {"fluids",
+        "of states of newtonian: an equation of state, and a viscosity that may change "
+        "with the rate"},
+       {"plastics",
+        "of states of plasticine, sand and non_newtonian: curved caps with cohesion, "
+        "crushing and the Lode angle, and rates of flow"}}};
+  for (const RandomLawKind kind : kRandomLawKinds) {
+    const auto [key, text] = keys[static_cast<std::size_t>(kind)];
+    std::int64_t& count = o.random_laws[static_cast<std::size_t>(kind)];
+    count = s.integer(key, 0, between(0, 100000), "", text);
+    if (count > 0 && bases_of(o, kind).empty() && !s.describing()) {
+      s.fail(key, fmt::format("expected 0 where `materials` has none of which states are taken, "
+                              "found {}",
+                              count));
+    }
+  }
 }
 
 void read_draw_options(Section& config, GenerateOptions& o) {

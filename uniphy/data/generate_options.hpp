@@ -60,8 +60,17 @@ struct GenerateOptions {
   double drawn_beyond = 1.5;
   std::array<double, 2> drawn_affine{0.1, 100};  ///< 1/s
 
-  std::int64_t total() const { return trajectories * static_cast<std::int64_t>(materials.size()); }
-  /// The material of a trajectory: all of one material stand together.
+  /// Trajectories of laws drawn at random, in the order of kRandomLawKinds; they follow the others.
+  std::array<std::int64_t, 3> random_laws{};
+
+  /// Those of the five families, which are simulated.
+  std::int64_t simulated() const {
+    return trajectories * static_cast<std::int64_t>(materials.size());
+  }
+  std::int64_t total() const {
+    return simulated() + random_laws[0] + random_laws[1] + random_laws[2];
+  }
+  /// The material of a simulated trajectory: all of one material stand together.
   const MaterialRanges& material_of(std::int64_t trajectory) const {
     return materials[static_cast<std::size_t>(trajectory / trajectories)];
   }
@@ -69,9 +78,11 @@ struct GenerateOptions {
 
 /// Declares and reads all keys of uniphy_generate.
 GenerateOptions read_generate_options(Section& config);
-/// The same without `seed` and `split`, for work that draws several sets itself. The default of the
-/// key `trajectories` is what `options` holds.
+/// The same without `seed`, `split` and `random_laws`, for work that draws several sets itself. The
+/// default of the key `trajectories` is what `options` holds.
 void read_draw_options(Section& config, GenerateOptions& options);
+/// Declares and reads the section `random_laws`, whose states come from options.materials.
+void read_random_laws(Section& config, GenerateOptions& options);
 
 /// The configuration of uniphy_generate that draws with these options, every key resolved: it reads
 /// back to the same options, and what generate_dataset writes with it is to the bit what the binary

@@ -20,7 +20,10 @@ enum class Stream : std::uint64_t {
   material = 2,
   body = 3,  ///< shape, size, rotation
   motion = 4,
-  sampling = 5  ///< which samples are kept, which states are drawn
+  sampling = 5,      ///< which samples are kept, which states are drawn
+  random_solid = 6,  ///< laws drawn at random, by kind
+  random_fluid = 7,
+  random_plastic = 8
 };
 
 /// The seed of one stream of one trajectory.

@@ -19,10 +19,10 @@ struct TrajectorySetup {
   const kernels::LawDescription& law() const { return scene.bodies.front().law; }
 };
 
-/// Draws trajectory `trajectory` (0 … options.total() − 1). `attempt` counts the replacements of
-/// runs that failed: the first half of the attempts stay in the part of the parameter ranges that
-/// belongs to the trajectory, the others draw from the whole ranges. Always the same for the same
-/// arguments.
+/// Draws trajectory `trajectory` (0 … options.simulated() − 1). `attempt` counts the replacements
+/// of runs that failed: the first half of the attempts stay in the part of the parameter ranges
+/// that belongs to the trajectory, the others draw from the whole ranges. Always the same for the
+/// same arguments.
 TrajectorySetup draw_setup(const GenerateOptions& options, std::int64_t trajectory,
                            std::int64_t attempt);
 

@@ -10,6 +10,7 @@
 #include <limits>
 
 #include "ops/kernels/base/error.hpp"
+#include "uniphy/data/random_law.hpp"
 #include "uniphy/inference/fit_findings.hpp"
 #include "uniphy/io/atomic_file.hpp"
 #include "uniphy/io/latent_file.hpp"
@@ -88,7 +89,7 @@ CaseResult identify_one(const IdentifyOptions& options, std::int64_t material,
   }
   row.other_best = std::numeric_limits<double>::infinity();
   for (int i = 0; i < variables.starts(); ++i) {
-    if (variables.label(i) == row.material) continue;
+    if (variables.label(i) == row.material || is_random_law(variables.label(i))) continue;
     row.other_best = std::min(row.other_best, result.fit.start_mse[i]);
   }
   row.beats_other = row.fit_mse < row.other_best;

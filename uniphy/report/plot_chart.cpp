@@ -59,9 +59,12 @@ bool plot_chart(const std::filesystem::path& png, const Chart& chart) {
       coloured = true;
       style = "using 1:2:3 with points pt 7 ps 0.9 lc palette";
     } else {
-      const char* colour = kColours[colour_index++ % std::size(kColours)];
-      style = fmt::format("using 1:2 with {} lc rgb '{}'",
-                          series.points ? "points pt 7 ps 0.9" : "lines lw 2", colour);
+      const char* colour = kColours[colour_index % std::size(kColours)];
+      // Where the colours begin anew, circles are open and lines dashed.
+      const bool again = colour_index++ >= std::size(kColours);
+      style = fmt::format("using 1:2 with {}{} lc rgb '{}'",
+                          series.points ? "points ps 0.9 pt " : "lines lw 2 dt ",
+                          series.points ? (again ? 6 : 7) : (again ? 2 : 1), colour);
     }
     plot += fmt::format("{} $s{} {} {}", plot.empty() ? "plot" : ", \\\n    ", i, style, title);
     if (!series.names.empty()) {

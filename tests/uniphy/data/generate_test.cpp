@@ -172,7 +172,8 @@ TEST(GenerateConfig, ReadsBackToTheSameOptions) {
         " density: 800}, body: {shapes: [box], heldout_shapes: [gear, pawn], size: [0.1, 0.2]},"
         " motion: {kinds: [left], speed: [1, 2], impact_over_yield: [1, 2], gap: [0, 0.1],"
         " angular_speed: [1, 2]}, samples: {every: 3, uniform_share: 0.5, drawn: {share: 0.1,"
-        " step: 0.02, strain: 0.3, beyond: 2, affine: [0.5, 7]}}}"}) {
+        " step: 0.02, strain: 0.3, beyond: 2, affine: [0.5, 7]}},"
+        " random_laws: {fluids: 4, plastics: 2}}"}) {
     const std::string once = generate_config(options_of(yaml));
     EXPECT_EQ(generate_config(options_of(once)), once);
     // Ranges of materials that are not drawn are all that the text may lose.
@@ -225,6 +226,102 @@ TEST(Generate, APartThatIsNoneIsNamed) {
   const auto file = scratch.write("000000.h5", "not HDF5");
   EXPECT_THAT(testing::error_of([&] { read_part(file); }), HasSubstr("000000.h5"));
   EXPECT_FALSE(read_part(scratch.file("000001.h5")).has_value());
+}
+
+constexpr const char* kWithRandomLaws =
+    "{trajectories: 2, simulation: {steps: 200, particles: 100}, samples: {per_trajectory: 80},"
+    " random_laws: {solids: 3, fluids: 2, plastics: 4}}";
+
+TEST(RandomLaws, FollowTheFamiliesWithTheSameBitsOnTwoThreads) {
+  testing::Scratch scratch;
+  const GenerateOptions options = options_of(kWithRandomLaws);
+  Metrics metrics, unused;
+  const std::string one = generate(options, scratch.file("one.h5"), 1, metrics);
+  EXPECT_TRUE(one == generate(options, scratch.file("two.h5"), 2, unused));
+  EXPECT_EQ(metrics.find("trajectories"), 19);
+  EXPECT_EQ(metrics.find("drawn.random_plastic"), 320);
+  EXPECT_GT(*metrics.find("share.random_plastic.yield"), 0.2);
+  EXPECT_GT(*metrics.find("strain_high.random_fluid"), 0);
+
+  Dataset data = read_dataset(scratch.file("one.h5"));
+  data.config = kWithRandomLaws;
+  std::vector<std::string> names;
+  for (std::size_t i = 10; i < data.trajectories.size(); ++i) {
+    const TrajectoryRecord& record = data.trajectories[i];
+    names.push_back(record.material);
+    for (const double parameter : record.parameters) EXPECT_TRUE(std::isnan(parameter));
+    EXPECT_GT(record.dt, 0);
+    EXPECT_EQ(data.first[i + 1] - data.first[i], 80);
+  }
+  EXPECT_EQ(names,
+            (std::vector<std::string>{"random_solid", "random_solid", "random_solid",
+                                      "random_fluid", "random_fluid", "random_plastic",
+                                      "random_plastic", "random_plastic", "random_plastic"}));
+  EXPECT_THAT(testing::error_of([&] { setup_of(data, 10); }), HasSubstr("has no scene"));
+  EXPECT_EQ(setup_of(data, 3).record.material, data.trajectories[3].material);
+}
+
+TEST(RandomLaws, LeaveTheFamiliesAndEachOtherAsTheyWere) {
+  testing::Scratch scratch;
+  Metrics metrics;
+  GenerateOptions options = options_of(kWithRandomLaws);
+  generate(options, scratch.file("with.h5"), 2, metrics);
+  options.random_laws = {0, 0, 0};
+  generate(options, scratch.file("without.h5"), 2, metrics);
+  options.random_laws = {5, 0, 4};
+  generate(options, scratch.file("more.h5"), 2, metrics);
+  const Dataset with = read_dataset(scratch.file("with.h5")),
+                without = read_dataset(scratch.file("without.h5")),
+                more = read_dataset(scratch.file("more.h5"));
+  const auto part = [](const Dataset& data, std::size_t first, std::size_t last) {
+    return std::vector<double>(data.samples.tau.begin() + 9 * data.first[first],
+                               data.samples.tau.begin() + 9 * data.first[last]);
+  };
+  EXPECT_EQ(part(with, 0, 10), without.samples.tau);
+  EXPECT_EQ(part(with, 0, 13), part(more, 0, 13));
+  EXPECT_EQ(part(with, 15, 19), part(more, 15, 19));
+}
+
+TEST(RandomLaws, GoOnWhereTheyStopped) {
+  testing::Scratch scratch;
+  const GenerateOptions options = options_of(kWithRandomLaws);
+  Metrics metrics;
+  const std::string whole = generate(options, scratch.file("d.h5"), 1, metrics);
+  std::filesystem::remove(scratch.file("d.h5"));
+  // What a run leaves that was interrupted among its random laws.
+  const auto parts = parts_directory(scratch.file("d.h5"), kSmall);
+  std::filesystem::create_directories(parts);
+  const Dataset data = [&] {
+    scratch.write("whole.h5", whole);
+    return read_dataset(scratch.file("whole.h5"));
+  }();
+  for (const std::int64_t i : {0, 1, 2, 11}) {
+    TrajectoryPart part;
+    const auto copy = [&](const std::vector<double>& from) {
+      return std::vector<double>(from.begin() + 9 * data.first[i],
+                                 from.begin() + 9 * data.first[i + 1]);
+    };
+    part.attempt = data.trajectories[i].attempt;
+    part.samples = {copy(data.samples.F),
+                    copy(data.samples.F_proj),
+                    copy(data.samples.C),
+                    copy(data.samples.tau),
+                    {data.samples.source.begin() + data.first[i],
+                     data.samples.source.begin() + data.first[i + 1]}};
+    if (i == 11) part.failures = {"mark"};  // shows that it is not made again
+    write_part(part_path(parts, i), part);
+  }
+  Metrics resumed;
+  EXPECT_TRUE(generate(options, scratch.file("d.h5"), 2, resumed) == whole);
+  EXPECT_EQ(resumed.find("failed.random_solid"), 1);
+  EXPECT_FALSE(std::filesystem::exists(parts));
+}
+
+TEST(RandomLaws, WithoutStatesAreRefused) {
+  EXPECT_EQ(testing::error_of(
+                [] { options_of("{materials: [elastic, sand], random_laws: {fluids: 2}}"); }),
+            "config:1: random_laws.fluids: expected 0 where `materials` has none of which "
+            "states are taken, found 2");
 }
 
 // The point of it all: every branch of every law is there, in what the simulations gave and in all.
