@@ -51,6 +51,9 @@ class Descent {
   void step(const Closure& closure);
   int evaluations() const { return evaluations_; }
   const std::vector<torch::Tensor>& leaves() const { return leaves_; }
+  /// Where the lowest loss was found, and that loss, infinite where none was.
+  const std::vector<torch::Tensor>& best() const { return best_; }
+  double best_loss() const { return best_loss_; }
 
   /// Everything that the next steps depend on, as the bytes of a Torch archive; load() continues to
   /// the same bits. Throws Error where they belong to leaves of another shape or are damaged.

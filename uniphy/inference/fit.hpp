@@ -9,6 +9,7 @@
 
 #include "uniphy/inference/fit_variables.hpp"
 #include "uniphy/inference/motion_objective.hpp"
+#include "uniphy/io/hdf5.hpp"
 
 namespace uniphy {
 
@@ -29,6 +30,7 @@ struct FitOptions {
   bool refine_velocity = false;  ///< the last stage also fits the initial velocity
   double prior = 0;              ///< weight of ‖z‖²/σ² against mse/size²
   double prior_sigma = 1;        ///< σ
+  double pull = 0;               ///< weight of FitVariables::departure, likewise
   double clip = 10;
   int patience = 8;  ///< a candidate is left as it is after so many evaluations without 1 % gained
   std::vector<FitStage> stages;  ///< the last one has horizon 1
@@ -108,5 +110,7 @@ std::vector<int> choose_starts(const FitVariables& variables, const std::vector<
 void write_fit_state(const std::filesystem::path& file, const FitState& state,
                      const std::string& fingerprint);
 FitState read_fit_state(const std::filesystem::path& file, const std::string& fingerprint);
+/// Throws Error where the attribute of / is another one.
+void check_fingerprint(const hdf5::Reader& reader, const std::string& fingerprint);
 
 }  // namespace uniphy

@@ -80,6 +80,13 @@ std::vector<std::string> fit_warnings(const Inference& inference, const Observat
                         ? "; where there is noise, velocity.frames takes the start from more frames"
                         : ""));
   }
+  if (!inference.explained) {
+    warn(fmt::format(
+        "the law found does not explain the motion: it misses the positions by {:.2g} % "
+        "of the size, where noise and tolerance account for {:.2g} %; {}",
+        100 * inference.misfit.over_size, 100 * inference.misfit.allowed,
+        misfit_place(inference.misfit, observation)));
+  }
   if (!fit.determined) return warnings;
   for (const FittedParameter& p : fitted_parameters(fit.law, variables)) {
     if (!p.outside()) continue;

@@ -30,6 +30,7 @@ std::string fit_summary(const FitResult& fit, const FitVariables& variables);
 ///   - the first frame is not an undeformed body in rigid motion (start_warning);
 ///   - less than one particle a cell (sparse_warning);
 ///   - a misfit of more than kLargeMisfit and the noise;
+///   - a motion that is not explained (Inference::explained), when and where;
 ///   - a parameter outside of its range;
 ///   - a learned law that flows_by_steps, at another time step than that of its training.
 std::vector<std::string> fit_warnings(const Inference& inference, const Observation& observation,

@@ -22,7 +22,8 @@ constexpr double kAngularUnit = 0.5;  // rad/s
 }  // namespace
 
 FitProblem::FitProblem(const Observation& observation, const std::string& name,
-                       const FitVariables& variables, const FitOptions& options)
+                       const FitVariables& variables, const FitOptions& options,
+                       const RigidMotion* motion)
     : observation_(observation),
       name_(name),
       variables_(variables),
@@ -30,7 +31,9 @@ FitProblem::FitProblem(const Observation& observation, const std::string& name,
       steps_(observed_steps(observation, name)),
       grid_(observed_grid(observation, name)),
       size_(observed_size(observation)),
-      motion_(observed_motion(observation, steps_, grid_, options.velocity_frames)),
+      motion_(motion != nullptr
+                  ? *motion
+                  : observed_motion(observation, steps_, grid_, options.velocity_frames)),
       contact_(first_contact(observation, steps_, grid_, motion_)),
       objective_(
           make_motion_objective(observation, steps_, grid_, options.dtype, options.rollout)) {
@@ -76,11 +79,32 @@ std::vector<double> FitProblem::frame_mse(const FitCandidate& c, std::ptrdiff_t 
   return objective_->frame_mse(variables_.law(c.u), motion(c), frames);
 }
 
+double FitProblem::prior_weight() const {
+  return options_.prior / (options_.prior_sigma * options_.prior_sigma);
+}
+
 Tensor FitProblem::loss_of(const Tensor& mse, const Tensor& u) const {
-  const Tensor loss = mse / (size_ * size_);
-  const double weight = options_.prior / (options_.prior_sigma * options_.prior_sigma);
-  const Tensor prior = weight > 0 ? variables_.prior(u) : Tensor();
-  return prior.defined() ? loss + weight * prior : loss;
+  Tensor loss = mse / (size_ * size_);
+  const Tensor prior = prior_weight() > 0 ? variables_.prior(u) : Tensor();
+  if (prior.defined()) loss = loss + prior_weight() * prior;
+  const Tensor departure = options_.pull > 0 ? variables_.departure(u) : Tensor();
+  return departure.defined() ? loss + options_.pull * departure : loss;
+}
+
+Tensor FitProblem::residuals(const Tensor& u, std::ptrdiff_t frames) const {
+  const torch::NoGradGuard no_grad;
+  const std::int64_t P = observation_.particles, all = 3 * P * frames;
+  try {
+    Tensor r = objective_->residuals(variables_.body(u, P), v0_, frames).view({frames, P, 3});
+    const std::int64_t stride = (all + kMostResiduals - 1) / kMostResiduals;
+    if (stride > 1) r = r.slice(1, 0, P, stride);
+    r = r.flatten() / (size_ * std::sqrt(static_cast<double>(r.numel())));
+    if (!r.isfinite().all().item<bool>()) return {};
+    const Tensor prior = prior_weight() > 0 ? variables_.prior(u) : Tensor();
+    return prior.defined() ? torch::cat({r, (prior_weight() * prior).sqrt().view({1})}) : r;
+  } catch (const Error&) {  // the roll-out failed
+    return {};
+  }
 }
 
 double FitProblem::loss(double mse, const Tensor& u) const {

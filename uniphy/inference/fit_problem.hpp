@@ -13,10 +13,11 @@ namespace uniphy {
 /// tried. Immutable, so that candidates can be evaluated side by side.
 class FitProblem {
  public:
-  /// Keeps references to the arguments. Throws Error where the schedule has no last stage with
-  /// horizon 1 or the model does not fit.
+  /// Keeps references to the arguments; `motion`, unless null, takes the place of the observed
+  /// initial velocity. Throws Error where the schedule has no last stage with horizon 1 or the
+  /// model does not fit.
   FitProblem(const Observation& observation, const std::string& name, const FitVariables& variables,
-             const FitOptions& options);
+             const FitOptions& options, const RigidMotion* motion = nullptr);
 
   const FitVariables& variables() const { return variables_; }
   int stages() const { return static_cast<int>(options_.stages.size()); }
@@ -48,9 +49,16 @@ class FitProblem {
   /// undefined where the loss is not finite.
   Evaluation evaluate(const std::vector<torch::Tensor>& leaves, int stage) const;
 
+  /// What least squares minimise at u with the initial velocity that is known, over the first
+  /// `frames`: (x̂ − x)/size and the root of the prior, scaled so that the sum of the squares is
+  /// loss(). Undefined where the roll-out fails. Of very many particles, every n-th is taken, so
+  /// that a column of a Jacobian has no more than kMostResiduals numbers.
+  torch::Tensor residuals(const torch::Tensor& u, std::ptrdiff_t frames) const;
+
   [[noreturn]] void refuse_starts() const;  ///< says why the first one cannot be simulated
 
  private:
+  double prior_weight() const;
   torch::Tensor loss_of(const torch::Tensor& mse, const torch::Tensor& u) const;
   torch::Tensor velocities(const torch::Tensor& motion) const;
 
@@ -66,5 +74,9 @@ class FitProblem {
   torch::Tensor v0_, arm_;  ///< [particles, 3] observed velocity, position from the centre
   std::unique_ptr<const MotionObjective> objective_;
 };
+
+/// 8 MB a column: a Jacobian of thirty is 240 MB. The benchmark cube of the field over 1000 steps,
+/// a frame every 5, has 603,000.
+inline constexpr std::int64_t kMostResiduals = 1000000;
 
 }  // namespace uniphy

@@ -1,10 +1,9 @@
 #include <fmt/format.h>
 #include <torch/torch.h>
 
-#include <cstring>
-
 #include "ops/kernels/base/error.hpp"
 #include "uniphy/inference/fit.hpp"
+#include "uniphy/inference/optimizer_bytes.hpp"
 #include "uniphy/io/hdf5.hpp"
 #include "uniphy/io/seal.hpp"
 
@@ -49,43 +48,16 @@ FitCandidate candidate(const double* row, std::size_t columns) {
   return c;
 }
 
-/// The archives of the optimizers one after the other, eight bytes in a word.
-std::vector<std::int64_t> words(const std::string& bytes) {
-  std::vector<std::int64_t> result((bytes.size() + 7) / 8, 0);
-  if (!bytes.empty()) std::memcpy(result.data(), bytes.data(), bytes.size());
-  return result;
-}
-
-void write_optimizers(hdf5::Writer& writer, const std::vector<FitCandidate>& candidates) {
-  std::string bytes;
-  std::vector<std::int64_t> sizes;
-  for (const FitCandidate& c : candidates) {
-    bytes += c.optimizer;
-    sizes.push_back(static_cast<std::int64_t>(c.optimizer.size()));
-  }
-  const std::vector<std::int64_t> all = words(bytes);
-  writer.write("optimizers", all, {static_cast<std::int64_t>(all.size())},
-               {"1", "Torch archives of the candidates' optimizers, one after the other"});
-  writer.write("optimizer_sizes", sizes, {static_cast<std::int64_t>(sizes.size())},
-               {"1", "bytes of each"});
-}
-
-void read_optimizers(const hdf5::Reader& reader, std::vector<FitCandidate>& candidates) {
-  const auto sizes =
-      reader.read<std::int64_t>("optimizer_sizes", {static_cast<std::int64_t>(candidates.size())});
-  const auto all = reader.read<std::int64_t>("optimizers", {-1});
-  const std::string bytes(reinterpret_cast<const char*>(all.data()), 8 * all.size());
-  std::size_t at = 0;
-  for (std::size_t i = 0; i < candidates.size(); ++i) {
-    if (sizes[i] < 0 || static_cast<std::size_t>(sizes[i]) > bytes.size() - at) {
-      reader.fail("/optimizer_sizes", "expected sizes that /optimizers has room for");
-    }
-    candidates[i].optimizer = bytes.substr(at, static_cast<std::size_t>(sizes[i]));
-    at += static_cast<std::size_t>(sizes[i]);
-  }
-}
-
 }  // namespace
+
+void check_fingerprint(const hdf5::Reader& reader, const std::string& fingerprint) {
+  const std::string found = reader.attribute_text("/", "fingerprint");
+  if (found == fingerprint) return;
+  reader.fail("attribute fingerprint of /",
+              fmt::format("expected {}, found {}: the observation, the model or the configuration "
+                          "has changed since; remove the file to start anew",
+                          fingerprint, found));
+}
 
 void write_fit_state(const std::filesystem::path& file, const FitState& state,
                      const std::string& fingerprint) {
@@ -104,7 +76,9 @@ void write_fit_state(const std::filesystem::path& file, const FitState& state,
   }
   writer.write("candidates", candidates.data, candidates.shape,
                {"1", "start, loss, mse, change of the linear and angular velocity, u"});
-  write_optimizers(writer, state.candidates);
+  std::vector<std::string> optimizers;
+  for (const FitCandidate& c : state.candidates) optimizers.push_back(c.optimizer);
+  write_optimizers(writer, optimizers);
   writer.write("history", history.data, history.shape,
                {"1", "stage, candidate, epoch, horizon (s), mse (m^2)"});
   writer.commit_sealed();
@@ -115,13 +89,7 @@ FitState read_fit_state(const std::filesystem::path& file, const std::string& fi
   if (reader.check_format(kFormat, 2) < 2) {
     reader.fail("attribute version of /", "expected 2; remove the file to start anew");
   }
-  const std::string found = reader.attribute_text("/", "fingerprint");
-  if (found != fingerprint) {
-    reader.fail("attribute fingerprint of /",
-                fmt::format("expected {}, found {}: the observation, the model or the "
-                            "configuration has changed since; remove the file to start anew",
-                            fingerprint, found));
-  }
+  check_fingerprint(reader, fingerprint);
   check_seal(file);
   FitState state;
   state.stage = static_cast<int>(reader.attribute_integer("/", "stage"));
@@ -141,7 +109,9 @@ FitState read_fit_state(const std::filesystem::path& file, const std::string& fi
   rows("candidates", kHeader + 1, [&](const double* row, std::size_t columns) {
     state.candidates.push_back(candidate(row, columns));
   });
-  read_optimizers(reader, state.candidates);
+  const auto optimizers =
+      read_optimizers(reader, static_cast<std::int64_t>(state.candidates.size()));
+  for (std::size_t i = 0; i < optimizers.size(); ++i) state.candidates[i].optimizer = optimizers[i];
   rows("history", 5, [&](const double* row, std::size_t) {
     state.history.push_back(
         {std::int32_t(row[0]), std::int32_t(row[1]), std::int32_t(row[2]), row[3], row[4]});

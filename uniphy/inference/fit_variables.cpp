@@ -13,6 +13,7 @@
 #include "ops/kernels/base/error.hpp"
 #include "ops/kernels/laws/law_parameters.hpp"
 #include "uniphy/data/material_ranges.hpp"
+#include "uniphy/data/random_law.hpp"
 #include "uniphy/geometry/random.hpp"
 
 namespace uniphy {
@@ -147,8 +148,12 @@ kernels::LawDescription FitVariables::law(const std::vector<double>& u) const {
 }
 
 std::vector<NearestCode> FitVariables::nearest(const std::vector<double>& u, int count) const {
+  // Laws drawn at random name nothing; a model of nothing else gives what it has.
+  bool named = false;
+  for (int i = 0; i < starts(); ++i) named = named || !is_random_law(label(i));
   std::vector<NearestCode> all;
   for (int i = 0; i < starts(); ++i) {
+    if (named && is_random_law(label(i))) continue;
     const std::vector<double> at = start(i);
     double square = 0;
     for (int k = 0; k < size(); ++k) square += (at[k] - u[k]) * (at[k] - u[k]);

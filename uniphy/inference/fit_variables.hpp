@@ -25,6 +25,9 @@ class FitVariables {
   virtual ops::RolloutBody body(const torch::Tensor& u, std::ptrdiff_t particles) const = 0;
   /// ‖z‖², a number that gradients go through; undefined for analytic laws, which have no prior.
   virtual torch::Tensor prior(const torch::Tensor& u) const = 0;
+  /// How far the networks have left the trained ones, a number that gradients go through; undefined
+  /// where they stay as they are.
+  virtual torch::Tensor departure(const torch::Tensor&) const { return {}; }
 
   /// Points to start from and the material that each stands for.
   virtual int starts() const = 0;
@@ -40,7 +43,8 @@ class FitVariables {
   /// The law of u for the kernels and for files.
   kernels::LawDescription law(const torch::Tensor& u) const;
   kernels::LawDescription law(const std::vector<double>& u) const;
-  /// The known points nearest to u, nearest first.
+  /// The known points nearest to u, nearest first; not those of laws drawn at random, which name
+  /// nothing, unless there are no others.
   std::vector<NearestCode> nearest(const std::vector<double>& u, int count) const;
 };
 

@@ -43,9 +43,13 @@ Trajectory observed_trajectory(const Observation& observation) {
 }
 
 Inference infer(const Observation& observation, const std::string& name,
-                const FitVariables& variables, const FitOptions& options, const FitHooks& hooks) {
+                const FitVariables& variables, const FitOptions& options, const FitHooks& hooks,
+                const AdaptationOptions& adaptation) {
   Inference result;
-  result.fit = fit_observation(observation, name, variables, options, hooks);
+  const Adaptation adapted = adapt(observation, name, variables, options, adaptation, hooks);
+  result.fit = adapted.fit;
+  result.rung = adapted.rung;
+  result.rungs = adapted.rungs;
   result.size = observed_size(observation);
   const Trajectory seen = observed_trajectory(observation);
   result.fitted = seen;
@@ -62,7 +66,30 @@ Inference infer(const Observation& observation, const std::string& name,
   result.fit_mse =
       compare_trajectories(result.fitted, seen, FrameMatch::all, "the fit", name).position_mse;
   result.best_start = *std::min_element(result.fit.start_mse.begin(), result.fit.start_mse.end());
+  result.misfit = misfit_of(observation, result.fitted, adaptation.tolerance);
+  result.explained = explains(result);
   return result;
+}
+
+bool explains(const Inference& inference) {
+  double most = inference.misfit.over_size;
+  for (const RungReport& r : inference.rungs) {
+    if (r.rung == inference.rung) most = std::max(most, r.kept);
+  }
+  return most <= inference.misfit.allowed;
+}
+
+ModelFile adapted_model(const Inference& inference, const Observation& observation,
+                        const std::string& config) {
+  const kernels::LawDescription& law = inference.fit.law;
+  ModelFile file;
+  file.weights = *law.weights;
+  file.latents = law.z;
+  file.materials = {"adapted"};
+  file.parameters = {no_parameters()};
+  file.config = config;
+  file.training_dt = {observation.dt, observation.dt};
+  return file;
 }
 
 LatentFile latent_of(const Inference& inference, const Observation& observation,
@@ -74,6 +101,8 @@ LatentFile latent_of(const Inference& inference, const Observation& observation,
   file.config = config;
   file.dt = observation.dt;
   file.determined = inference.fit.determined;
+  file.rung = rung_name(inference.rung);
+  file.explained = inference.explained;
   if (fit.law.id == kernels::LawId::learned) {
     file.model = model;
     file.z = fit.law.z;
@@ -123,6 +152,15 @@ void add_metrics(Metrics& metrics, const Inference& inference, const Observation
   metrics.set("contact", fit.determined ? 1 : 0);
   if (fit.determined) {
     metrics.set("contact_s", observation.time[fit.contact] - observation.time[0]);
+  }
+  metrics.set("explained", inference.explained ? 1 : 0);
+  metrics.set("rung", static_cast<double>(inference.rung));
+  for (const RungReport& r : inference.rungs) {
+    const std::string rung = rung_name(r.rung);
+    metrics.set("fitted_over_size." + rung, r.fitted);
+    metrics.set("kept_over_size." + rung, r.kept);
+    metrics.set("roll_outs." + rung, r.roll_outs);
+    metrics.set("seconds." + rung, r.seconds);
   }
   const char* axes[] = {"x", "y", "z"};
   for (int k = 0; k < 3; ++k) {

@@ -5,8 +5,9 @@
 #include <optional>
 #include <string>
 
-#include "uniphy/inference/fit.hpp"
+#include "uniphy/inference/adaptation.hpp"
 #include "uniphy/inference/infer_options.hpp"
+#include "uniphy/inference/misfit.hpp"
 #include "uniphy/inference/observation_check.hpp"
 #include "uniphy/io/trajectory.hpp"
 #include "uniphy/report/metrics.hpp"
@@ -17,22 +18,35 @@ namespace uniphy {
 /// A finished inference and the roll-out of its result.
 struct Inference {
   FitResult fit;
-  Trajectory fitted;       ///< at the observed frames
-  double fit_mse = 0;      ///< m², of `fitted` against the observation
-  double size = 0;         ///< m, largest side of the observed body
-  double best_start = 0;   ///< m², what the best start reaches over all frames
-  ObservationCheck check;  ///< whether the observation is what the fit takes it for
+  Trajectory fitted;              ///< at the observed frames
+  double fit_mse = 0;             ///< m², of `fitted` against the observation
+  double size = 0;                ///< m, largest side of the observed body
+  double best_start = 0;          ///< m², what the best start reaches over all frames
+  ObservationCheck check;         ///< whether the observation is what the fit takes it for
+  Rung rung = Rung::latent;       ///< how far the law was adapted
+  std::vector<RungReport> rungs;  ///< see Adaptation
+  Misfit misfit;                  ///< of `fitted`
+  bool explained = true;  ///< whether noise and tolerance account for the misfit, see explains()
 };
 
-/// Fits and rolls out once more. Throws Error.
+/// Fits and rolls out once more; z alone unless `adaptation` says otherwise. Throws Error.
 Inference infer(const Observation& observation, const std::string& name,
-                const FitVariables& variables, const FitOptions& options, const FitHooks& hooks);
+                const FitVariables& variables, const FitOptions& options, const FitHooks& hooks,
+                const AdaptationOptions& adaptation = {{Rung::latent}});
+
+/// Whether noise and tolerance account for the misfit of all frames, and, where frames were kept,
+/// for the error there of the rung chosen before it saw them.
+bool explains(const Inference& inference);
 
 /// The product of uniphy_infer. `model` is the path that resimulate will look for. Names no
 /// nearest codes where the material is not determined.
 LatentFile latent_of(const Inference& inference, const Observation& observation,
                      const FitVariables& variables, const std::string& model,
                      const std::string& config);
+
+/// The adapted law as a model, with the fitted code as its only one.
+ModelFile adapted_model(const Inference& inference, const Observation& observation,
+                        const std::string& config);
 
 /// Roll-outs with gradients, of all candidates, until the mse over all frames was a hundredth of
 /// the best start's: what optimizers are compared by. Nothing where that was never reached.
@@ -43,7 +57,9 @@ std::optional<std::size_t> roll_outs_to_a_hundredth(const FitResult& fit);
 /// contact (1, or 0 where no wall acted before the last frame), contact_s,
 /// start_residual_over_size, start_allowed_over_size, start_frames, noise_over_size,
 /// energy_gain_over_kinetic (ObservationCheck; 0 of a body that does not move),
-/// velocity.{x,y,z}, angular_velocity.{x,y,z} and, where the material is determined,
+/// velocity.{x,y,z}, angular_velocity.{x,y,z}; where the material is determined,
+/// explained (1 or 0), rung (0 latent, 1 numbers, 2 weights) and, where frames were kept, of every
+/// rung that was tried fitted_over_size.RUNG, kept_over_size.RUNG, roll_outs.RUNG, seconds.RUNG;
 /// nearest.distance and, of an analytic law, parameter.NAME and outside_range.NAME (1 where it
 /// ended outside of its range).
 void add_metrics(Metrics& metrics, const Inference& inference, const Observation& observation,

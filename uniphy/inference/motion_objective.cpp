@@ -41,6 +41,12 @@ class RolloutObjective : public MotionObjective {
   }
 
   Tensor mse(const ops::RolloutBody& body, const Tensor& v0, std::ptrdiff_t frames) const override {
+    // First within the frames: sums of rows have one order on any number of threads.
+    return residuals(body, v0, frames).square().mean(1).mean();
+  }
+
+  Tensor residuals(const ops::RolloutBody& body, const Tensor& v0,
+                   std::ptrdiff_t frames) const override {
     ops::RolloutSettings settings;
     settings.grid = grid_;
     settings.steps = steps_.last(frames);
@@ -49,10 +55,7 @@ class RolloutObjective : public MotionObjective {
                         settings, {})
                    .x;
     if (x.size(0) != frames) x = x.index_select(0, states_.slice(0, 0, frames));
-    const Tensor difference =
-        x.flatten(1).to(torch::kFloat64) - seen_.slice(0, 0, frames);  // [frames, 3 particles]
-    // First within the frames: sums of rows have one order on any number of threads.
-    return difference.square().mean(1).mean();
+    return x.flatten(1).to(torch::kFloat64) - seen_.slice(0, 0, frames);
   }
 
   std::vector<double> frame_mse(const kernels::LawDescription& law, const RigidMotion& motion,

@@ -27,6 +27,9 @@ class MotionObjective {
   /// where the roll-out goes step by step). Throws Error where the roll-out fails.
   virtual torch::Tensor mse(const ops::RolloutBody& body, const torch::Tensor& v0,
                             std::ptrdiff_t frames) const = 0;
+  /// x̂ − x, m, float64 [frames, 3 particles], by the same roll-out.
+  virtual torch::Tensor residuals(const ops::RolloutBody& body, const torch::Tensor& v0,
+                                  std::ptrdiff_t frames) const = 0;
   /// Mean over particles and coordinates at each of the first `frames` frames; infinite from where
   /// the roll-out fails. Nothing is kept for gradients: this is how starts are compared.
   virtual std::vector<double> frame_mse(const kernels::LawDescription& law,

@@ -41,7 +41,8 @@ ops::LawOutput law_of(const ops::RolloutBody& body, const Tensor& F, const Tenso
   const Tensor z =
       (body.parameters.defined() ? body.parameters : torch::tensor(body.law.z, torch::kFloat64))
           .to(F.dtype());
-  const Tensor F_proj = ops::learned_project(body.networks, F, z);  // lines 7-9: SVD, g(F), F + Δ
+  const Tensor F_proj =
+      ops::learned_project(body.networks, F, z, dt);  // lines 7-9: SVD, g(F), F + Δ
   return {F_proj, ops::learned_stress(body.networks, F_proj, C, z)};  // lines 10-12: SVD, R, f, Ŝ
 }
 

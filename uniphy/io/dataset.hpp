@@ -10,7 +10,8 @@
 //   /samples/trajectory [S]     1    row of /trajectories, not decreasing
 //   /samples/source     [S]     1    0: state of a simulation, 1: state drawn at random and put to
 //                                    the law; a file without it holds simulated states only
-//   /trajectories/material   [N]     name of the law
+//   /trajectories/material   [N]     name of the law; random_solid, random_fluid, random_plastic:
+//                                    one drawn at random, whose numbers follow from the seed
 //   /trajectories/parameters [N, 5]  mu (Pa), lambda (Pa), tau_y (Pa), theta (rad), eta (Pa s);
 //                                    NaN where the law has none
 //   /trajectories/dt [N] s, density [N] kg/m^3, seed [N], shape [N]

@@ -62,6 +62,8 @@ void write_latent(const std::filesystem::path& file, const LatentFile& latent) {
   writer.attribute("/", "config", latent.config);
   if (latent.dt > 0) writer.attribute("/", "dt", latent.dt);
   writer.attribute("/", "determined", latent.determined ? 1 : 0);
+  writer.attribute("/", "rung", latent.rung);
+  writer.attribute("/", "explained", latent.explained ? 1 : 0);
   if (latent.law == "learned") {
     writer.attribute("/", "model", latent.model);
     writer.write("z", latent.z, {static_cast<std::int64_t>(latent.z.size())}, {"1", "latent code"});
@@ -108,6 +110,10 @@ LatentFile read_latent(const std::filesystem::path& file) {
   }
   if (reader.has_attribute("/", "determined")) {
     latent.determined = reader.attribute_integer("/", "determined") != 0;
+  }
+  if (reader.has_attribute("/", "rung")) latent.rung = reader.attribute_text("/", "rung");
+  if (reader.has_attribute("/", "explained")) {
+    latent.explained = reader.attribute_integer("/", "explained") != 0;
   }
   if (latent.law == "learned") {
     latent.model = reader.attribute_text("/", "model");

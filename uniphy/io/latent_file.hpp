@@ -6,7 +6,9 @@
 //               law, model = path of the model file that z belongs to (learned only),
 //               config = YAML of the fit, dt = time step of the observation (s), determined = 1, or
 //               0 where the observation did not show the material; files without dt or determined
-//               are older: not known, and 1
+//               are older: not known, and 1; rung = "latent", "numbers" or "weights", how far the
+//               law was adapted (model is then the adapted one), explained = 1, or 0 where the
+//               fitted law does not explain the motion; files without them are older: latent, and 1
 //   /z          [latent_size]  1  latent code (learned only)
 //   /parameters [5]            mu, lambda (Pa; mu of newtonian Pa s), tau_y (Pa), theta (rad),
 //                              eta (Pa s); NaN where the law has none (analytic laws only)
@@ -50,8 +52,10 @@ struct LatentFile {
   std::vector<FitRecord> history;
   std::vector<NearestCode> nearest;
   std::string config;
-  double dt = 0;           ///< s, of the observation and the roll-outs; 0: not known
-  bool determined = true;  ///< false: any other material would have moved like it
+  double dt = 0;                ///< s, of the observation and the roll-outs; 0: not known
+  bool determined = true;       ///< false: any other material would have moved like it
+  std::string rung = "latent";  ///< how far the law was adapted: latent, numbers or weights
+  bool explained = true;        ///< false: the law misses the motion by more than the noise
 };
 
 void write_latent(const std::filesystem::path& file, const LatentFile& latent);

@@ -99,6 +99,25 @@ TEST(FitProblem, GradientByTheInitialVelocity) {
   EXPECT_NEAR(moved.angular[1] - observed.angular[1], 0.2, 1e-12);  // and of 0.5 rad/s
 }
 
+TEST(FitProblem, TheSquaresOfTheResidualsSumToTheLoss) {
+  const Setting s;
+  for (const double weight : {0.0, 0.3}) {
+    const FitOptions options = options_with(weight);
+    const FitProblem problem(s.observation, s.name, *s.variables, options);
+    const FitCandidate c = problem.candidate(3);
+    const Tensor r = problem.residuals(c.u, problem.frames());
+    const std::vector<Tensor> leaves = problem.leaves(c, 0);
+    const double loss = problem.evaluate(leaves, 0).loss.item<double>();
+    EXPECT_NEAR(r.square().sum().item<double>(), loss, 1e-12 * loss);
+    EXPECT_EQ(r.numel(), s.observation.frames * s.observation.particles * 3 + (weight > 0 ? 1 : 0));
+  }
+  const FitOptions options = options_with(0);
+  const FitProblem problem(s.observation, s.name, *s.variables, options);
+  FitCandidate c = problem.candidate(0);
+  c.u[0] = 50;  // far too stiff for the time step
+  EXPECT_FALSE(problem.residuals(c.u, problem.frames()).defined());
+}
+
 TEST(FitProblem, WhereTheRollOutFailsTheLossIsInfiniteAndThereIsNoGradient) {
   const Setting s;
   const FitOptions options = options_with(0);

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "uniphy/inference/adapted_variables.hpp"
+#include "uniphy/inference/fit.hpp"
+
+namespace uniphy {
+
+struct AdaptationOptions {
+  std::vector<Rung> rungs{Rung::latent, Rung::numbers, Rung::weights};  ///< upwards, latent first
+  /// Share of the time from first contact to the last frame that is kept from the fits: the frames
+  /// at the end, which decide between the rungs.
+  double kept = 0.25;
+  double gain = 0.2;     ///< share of the error there that a rung has to take away to pay
+  double enough = 3e-4;  ///< root of the mean square error over size that asks for no more
+  double pull = 1e-8;    ///< weight of ‖W − W₀‖² on the last rung, against mse/size²
+  /// Root of the mean square error over size, beside the noise, of a motion that counts as
+  /// explained: ten times what the five families leave, a third of what jelly leaves at z alone.
+  double tolerance = 1e-3;
+  int iterations = 12;              ///< of LevenbergMarquardt, at most
+  int epochs = 60;                  ///< roll-outs with gradients of all weights
+  std::string optimizer = "lbfgs";  ///< of all weights, see DescentOptions
+  double rate = 0.01;               ///< likewise
+};
+
+/// What a rung came to.
+struct RungReport {
+  Rung rung = Rung::latent;
+  /// Root of the mean square error over size, on the frames that were fitted and on those kept;
+  /// infinite where the roll-out fails.
+  double fitted = 0, kept = 0;
+  int roll_outs = 0;
+  double seconds = 0;  ///< of the runs that finished its steps
+};
+
+struct Adaptation {
+  FitResult fit;  ///< of the rung chosen; its u is that of the latent variables
+  Rung rung = Rung::latent;
+  std::vector<RungReport> rungs;  ///< those that were tried; empty where nothing was kept
+};
+
+/// Finds the law of an observation with as much freedom as its motion asks for: z; then also the
+/// law's own numbers, the biases of the last layers; then all weights, pulled towards the trained
+/// ones.
+///
+/// 1. Every rung is fitted to the first part of the observation, from the best point of the rung
+///    before: z as in fit_observation, then it and the numbers by LevenbergMarquardt, the weights
+///    by Descent.
+/// 2. The frames that were kept decide. The ladder ends where a rung explains both parts to
+///    `enough` and the noise, or where the next one does not take away `gain` of the error on the
+///    kept part; then the one before is the result.
+/// 3. Where z does not explain the motion, the best start of every other material goes up to
+///    `numbers` too, for a few iterations: the nearest code of the trained family may be of the
+///    wrong kind. The kept frames choose among them.
+/// 4. The rung chosen is fitted to the whole observation, from where it is.
+///
+/// Without a contact, with analytic variables, which have no rungs, and where `latent` is the only
+/// one, it is fit_observation. Resumes like it, with adaptation_state_file() beside its state file.
+/// Results have the same bits on any number of threads. hooks.on_record is called after every step
+/// above z too, with a stage beyond those of the schedule and infinite horizon.
+Adaptation adapt(const Observation& observation, const std::string& name,
+                 const FitVariables& variables, const FitOptions& options,
+                 const AdaptationOptions& adaptation, const FitHooks& hooks = {});
+
+/// The first frames of an observation.
+Observation first_frames(const Observation& observation, std::ptrdiff_t frames);
+
+/// The rungs as a table, a line each.
+std::string rung_table(Rung chosen, const std::vector<RungReport>& rungs);
+
+}  // namespace uniphy

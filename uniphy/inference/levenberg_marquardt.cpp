@@ -1,0 +1,199 @@
+#include "uniphy/inference/levenberg_marquardt.hpp"
+
+#include <torch/torch.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <sstream>
+
+#include "ops/kernels/base/error.hpp"
+#include "ops/kernels/base/for_each.hpp"
+
+namespace uniphy {
+namespace {
+
+using torch::Tensor;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// Dampings that are tried at once, in multiples of the one that served last.
+constexpr std::array<double, 4> kTrials{1e-2, 1e-1, 1, 10};
+/// How often the damping grows by kGrowth before a step is given up.
+constexpr int kRounds = 3;
+constexpr double kGrowth = 1e4;
+/// Beyond these a damping means no step, or none at all, to double precision.
+constexpr double kLeastDamping = 1e-12, kLargestDamping = 1e8;
+/// Of the largest curvature: what a direction that is hardly seen is damped by at least, so that it
+/// does not run away along differences that are rounding.
+constexpr double kFloor = 1e-6;
+
+using ConstVector = Eigen::Map<const Eigen::VectorXd>;
+
+ConstVector vector_of(const Tensor& t) { return {t.data_ptr<double>(), t.numel()}; }
+
+double loss_of(const Tensor& residuals) {
+  if (!residuals.defined()) return kInfinity;
+  const double loss = vector_of(residuals).squaredNorm();
+  return std::isfinite(loss) ? loss : kInfinity;
+}
+
+Tensor moved(const Tensor& point, const Eigen::VectorXd& step) {
+  Tensor result = point.clone();
+  for (Eigen::Index k = 0; k < step.size(); ++k) result.data_ptr<double>()[k] += step[k];
+  return result;
+}
+
+}  // namespace
+
+LevenbergMarquardt::LevenbergMarquardt(std::vector<Tensor> leaves,
+                                       const LevenbergMarquardtOptions& options)
+    : Optimizer({torch::optim::OptimizerParamGroup(std::move(leaves))},
+                std::make_unique<LevenbergMarquardtOptions>(options)),
+      loss_(kInfinity),
+      damping_(options.damping()) {}
+
+const LevenbergMarquardtOptions& LevenbergMarquardt::options() const {
+  return static_cast<const LevenbergMarquardtOptions&>(defaults());
+}
+
+Tensor LevenbergMarquardt::point() const {
+  std::vector<Tensor> parts;
+  for (const Tensor& leaf : param_groups()[0].params()) parts.push_back(leaf.detach().flatten());
+  return torch::cat(parts);
+}
+
+void LevenbergMarquardt::move_to(const Tensor& point) {
+  const torch::NoGradGuard no_grad;
+  std::int64_t at = 0;
+  for (Tensor& leaf : param_groups()[0].params()) {
+    leaf.copy_(point.slice(0, at, at + leaf.numel()).view_as(leaf));
+    at += leaf.numel();
+  }
+}
+
+Tensor LevenbergMarquardt::step(LossClosure) {
+  throw Error("Levenberg-Marquardt: expected a closure that gives residuals, found one of a loss");
+}
+
+Tensor LevenbergMarquardt::step(const Residuals& residuals) {
+  const torch::NoGradGuard no_grad;
+  if (!residuals_.defined()) {
+    residuals_ = residuals(point());
+    if (!std::isfinite(loss_)) ++evaluations_;  // else it is known from before an interruption
+    loss_ = loss_of(residuals_);
+  }
+  stuck_ = true;
+  if (std::isfinite(loss_) && loss_ > 0) {
+    const Eigen::MatrixXd J = jacobian(residuals);
+    const Eigen::Index n = J.cols();
+    Eigen::MatrixXd A(n, n);
+    Eigen::VectorXd g(n);
+    kernels::for_each(n, [&](std::ptrdiff_t i) {
+      for (Eigen::Index j = 0; j <= i; ++j) A(i, j) = A(j, i) = J.col(i).dot(J.col(j));
+      g[i] = J.col(i).dot(vector_of(residuals_));
+    });
+    const Trial best = best_trial(residuals, A, g);
+    if (best.loss < loss_) {
+      move_to(best.point);
+      residuals_ = best.residuals;
+      loss_ = best.loss;
+      damping_ = std::max(best.damping, kLeastDamping);
+      stuck_ = false;
+    }
+  }
+  return torch::scalar_tensor(loss_, torch::kFloat64);
+}
+
+/// Where a point a step further on has no residuals, the one a step back is taken.
+Eigen::MatrixXd LevenbergMarquardt::jacobian(const Residuals& residuals) {
+  const Tensor here = point();
+  const Eigen::Index n = here.numel();
+  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(residuals_.numel(), n);
+  std::vector<int> calls(n, 0);
+  kernels::for_each(n, [&](std::ptrdiff_t k) {
+    const torch::NoGradGuard no_grad;
+    for (const double h : {options().difference(), -options().difference()}) {
+      const Tensor there = residuals(moved(here, h * Eigen::VectorXd::Unit(n, k)));
+      ++calls[k];
+      if (!std::isfinite(loss_of(there))) continue;
+      J.col(k) = (vector_of(there) - vector_of(residuals_)) / h;
+      return;
+    }
+  });
+  for (const int count : calls) evaluations_ += count;
+  return J;
+}
+
+LevenbergMarquardt::Trial LevenbergMarquardt::best_trial(const Residuals& residuals,
+                                                         const Eigen::MatrixXd& A,
+                                                         const Eigen::VectorXd& g) {
+  const Tensor here = point();
+  const double largest = A.diagonal().maxCoeff();
+  Trial best;
+  best.loss = kInfinity;
+  if (!(largest > 0)) return best;
+  for (int round = 0; round < kRounds; ++round) {
+    std::array<Trial, kTrials.size()> trials;
+    kernels::for_each(static_cast<std::ptrdiff_t>(trials.size()), [&](std::ptrdiff_t i) {
+      const torch::NoGradGuard no_grad;
+      Trial& trial = trials[i];
+      trial.damping = kTrials[i] * damping_;
+      Eigen::MatrixXd damped = A;
+      damped.diagonal() += trial.damping * A.diagonal().cwiseMax(kFloor * largest);
+      Eigen::VectorXd step = damped.ldlt().solve(-g);
+      for (Eigen::Index k = 0; k < step.size(); ++k) {
+        if (A(k, k) == 0) step[k] = 0;
+      }
+      trial.point = moved(here, step);
+      if (step.allFinite()) trial.residuals = residuals(trial.point);
+      trial.loss = loss_of(trial.residuals);
+    });
+    evaluations_ += static_cast<int>(trials.size());
+    for (const Trial& trial : trials) {
+      if (trial.loss < best.loss) best = trial;
+    }
+    if (best.loss < loss_ || damping_ > kLargestDamping) break;
+    damping_ *= kGrowth;
+  }
+  return best;
+}
+
+std::string LevenbergMarquardt::saved() const {
+  torch::serialize::OutputArchive archive;
+  archive.write("numbers", torch::tensor({damping_, double(evaluations_), double(stuck_), loss_},
+                                         torch::kFloat64));
+  archive.write("point", point());
+  std::ostringstream bytes;
+  archive.save_to(bytes);
+  return bytes.str();
+}
+
+void LevenbergMarquardt::resume(const std::string& bytes) {
+  Tensor numbers, there;
+  try {
+    torch::serialize::InputArchive archive;
+    std::istringstream stream(bytes);
+    archive.load_from(stream);
+    archive.read("numbers", numbers);
+    archive.read("point", there);
+  } catch (const std::exception& error) {  // of Torch, with a trace of calls after the first line
+    const std::string text = error.what();
+    throw Error("state of the optimizer: " + text.substr(0, text.find('\n')));
+  }
+  const Tensor here = point();
+  if (there.sizes() != here.sizes() || numbers.numel() != 4) {
+    throw Error("state of the optimizer: expected " + std::to_string(here.numel()) +
+                " numbers, found " + std::to_string(there.numel()));
+  }
+  move_to(there);
+  damping_ = numbers[0].item<double>();
+  evaluations_ = static_cast<int>(numbers[1].item<double>());
+  stuck_ = numbers[2].item<double>() != 0;
+  loss_ = numbers[3].item<double>();
+  residuals_ = Tensor();
+}
+
+}  // namespace uniphy

@@ -1,0 +1,130 @@
+#include "uniphy/inference/misfit.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "uniphy/inference/observed_motion.hpp"
+#include "uniphy/inference/observed_noise.hpp"
+#include "uniphy/io/atomic_file.hpp"
+
+namespace uniphy {
+namespace {
+
+constexpr int kThirds = 3;
+constexpr int kBlocks = kThirds * kThirds * kThirds;
+
+/// The block of every particle, x + 3 y + 9 z.
+std::vector<int> blocks_of(const Observation& seen) {
+  const double* x = seen.positions(0);
+  std::vector<int> blocks(static_cast<std::size_t>(seen.particles), 0);
+  for (int k = 0, weight = 1; k < 3; ++k, weight *= kThirds) {
+    double low = x[k], high = x[k];
+    for (std::int64_t p = 0; p < seen.particles; ++p) {
+      low = std::min(low, x[3 * p + k]);
+      high = std::max(high, x[3 * p + k]);
+    }
+    for (std::int64_t p = 0; p < seen.particles; ++p) {
+      const double share = high > low ? (x[3 * p + k] - low) / (high - low) : 0;
+      blocks[p] += weight * std::min(kThirds - 1, static_cast<int>(kThirds * share));
+    }
+  }
+  return blocks;
+}
+
+void find_block(const Observation& seen, const std::vector<double>& square, Misfit& misfit) {
+  const std::vector<int> blocks = blocks_of(seen);
+  std::array<double, kBlocks> sum{}, count{};
+  for (std::int64_t p = 0; p < seen.particles; ++p) {
+    sum[blocks[p]] += square[p];
+    ++count[blocks[p]];
+  }
+  int worst = 0;
+  const auto mean = [&](int b) { return count[b] > 0 ? sum[b] / count[b] : 0; };
+  for (int b = 1; b < kBlocks; ++b) {
+    if (mean(b) > mean(worst)) worst = b;
+  }
+  misfit.block = {worst % kThirds, worst / kThirds % kThirds, worst / (kThirds * kThirds)};
+  misfit.block_root = std::sqrt(mean(worst));
+}
+
+}  // namespace
+
+Misfit misfit_of(const Observation& seen, const Trajectory& fitted, double tolerance) {
+  const double size = observed_size(seen);
+  Misfit m;
+  m.time = seen.time;
+  m.allowed = std::hypot(tolerance, 2 * observed_noise(seen) / size);
+  std::vector<double> square(static_cast<std::size_t>(seen.particles), 0);  // of a coordinate
+  for (std::int64_t f = 0; f < seen.frames; ++f) {
+    double sum = 0, largest = 0;
+    for (std::int64_t p = 0; p < seen.particles; ++p) {
+      double distance = 0;
+      for (int k = 0; k < 3; ++k) {
+        const double d = (fitted.positions(f)[3 * p + k] - seen.positions(f)[3 * p + k]) / size;
+        distance += d * d;
+      }
+      square[p] += distance / (3.0 * double(seen.frames));
+      sum += distance / (3.0 * double(seen.particles));
+      largest = std::max(largest, distance);
+    }
+    m.root.push_back(std::sqrt(sum));
+    m.largest.push_back(std::sqrt(largest));
+    m.over_size += sum / double(seen.frames);
+  }
+  m.over_size = std::sqrt(m.over_size);
+  m.grows = seen.frames;
+  while (m.grows > 0 && m.root[m.grows - 1] > m.allowed) --m.grows;
+  m.particle = std::max_element(square.begin(), square.end()) - square.begin();
+  find_block(seen, square, m);
+  return m;
+}
+
+std::string misfit_place(const Misfit& m, const Observation& seen) {
+  constexpr const char* kThird[] = {"low", "middle", "high"};
+  const auto last = static_cast<std::int64_t>(m.time.size()) - 1;
+  const auto peak = std::max_element(m.root.begin(), m.root.end()) - m.root.begin();
+  const std::string when =
+      m.grows <= last
+          ? fmt::format("from {:.3g} s on it stays above that", m.time[m.grows] - m.time[0])
+          : fmt::format("it is largest at {:.3g} s", m.time[peak] - m.time[0]);
+  const double* x = seen.positions(0) + 3 * m.particle;
+  return fmt::format(
+      "{}; it is largest, {:.2g} %, in the {} third along x, {} along y and {} along z of the body "
+      "at the first frame, and of particle {}, at ({:.3f}, {:.3f}, {:.3f}) m there",
+      when, 100 * m.block_root, kThird[m.block[0]], kThird[m.block[1]], kThird[m.block[2]],
+      m.particle, x[0], x[1], x[2]);
+}
+
+void write_misfit(const std::filesystem::path& csv, const Misfit& m) {
+  std::string text = "time_s,root_over_size,largest_over_size\n";
+  for (std::size_t f = 0; f < m.time.size(); ++f) {
+    text += fmt::format("{:.9g},{:.9g},{:.9g}\n", m.time[f], m.root[f], m.largest[f]);
+  }
+  write_text_file(csv, text);
+}
+
+Chart misfit_chart(const Misfit& m) {
+  Chart chart;
+  chart.title = "What the fitted law leaves";
+  chart.x_label = "time (s)";
+  chart.y_label = "error over size";
+  chart.log_y = true;
+  const auto line = [&](const std::string& label, const std::vector<double>& y) {
+    Series series;
+    series.label = label;
+    series.x = m.time;
+    series.y = y;
+    for (double& value : series.y) {
+      if (!(value > 0)) value = std::nan("");
+    }
+    chart.series.push_back(series);
+  };
+  line("root of the mean square", m.root);
+  line("largest particle", m.largest);
+  line("noise and tolerance", std::vector<double>(m.time.size(), m.allowed));
+  return chart;
+}
+
+}  // namespace uniphy

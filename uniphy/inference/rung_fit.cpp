@@ -1,0 +1,76 @@
+#include "uniphy/inference/rung_fit.hpp"
+
+#include <torch/torch.h>
+
+#include <chrono>
+#include <cmath>
+
+#include "uniphy/inference/levenberg_marquardt.hpp"
+
+namespace uniphy {
+namespace {
+
+using torch::Tensor;
+
+/// Adds the seconds of its life to the task.
+class Stopwatch {
+ public:
+  explicit Stopwatch(RungTask& task) : task_(task), seconds_(task.seconds) {}
+  void look() {
+    const std::chrono::duration<double> time = std::chrono::steady_clock::now() - start_;
+    task_.seconds = seconds_ + time.count();
+  }
+
+ private:
+  RungTask& task_;
+  double seconds_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+constexpr double kLittleGain = 0.02;
+constexpr int kPatience = 2;
+
+}  // namespace
+
+Tensor least_squares(const FitProblem& problem, const Tensor& start, std::ptrdiff_t frames,
+                     int iterations, RungTask& task, const AfterStep& after_step) {
+  const Tensor leaf = start.detach().clone();
+  LevenbergMarquardt optimizer({leaf}, LevenbergMarquardtOptions());
+  if (task.steps > 0) optimizer.resume(task.optimizer);
+  const auto residuals = [&](const Tensor& u) {
+    const Tensor r = problem.residuals(u, frames);
+    return r.defined() ? torch::cat({r, std::sqrt(kWeakPrior) * (u - start)}) : r;
+  };
+  Stopwatch watch(task);
+  while (!task.done) {
+    const double before = optimizer.loss();
+    const double loss = optimizer.step(residuals).item<double>();
+    ++task.steps;
+    task.idle = loss < (1 - kLittleGain) * before ? 0 : task.idle + 1;
+    task.done = optimizer.stuck() || task.steps >= iterations || task.idle >= kPatience;
+    task.roll_outs = optimizer.evaluations();
+    task.optimizer = optimizer.saved();
+    watch.look();
+    after_step(task, loss);
+  }
+  return optimizer.point();
+}
+
+Tensor descend(const FitProblem& problem, const Tensor& start, const DescentOptions& options,
+               RungTask& task, const AfterStep& after_step) {
+  Descent descent(options, {start.detach().clone().requires_grad_()});
+  if (task.steps > 0) descent.load(task.optimizer);
+  Stopwatch watch(task);
+  while (!task.done) {
+    descent.step([&] { return problem.evaluate(descent.leaves(), 0).loss; });
+    ++task.steps;
+    task.done = descent.done();
+    task.roll_outs = descent.evaluations();
+    task.optimizer = descent.save();
+    watch.look();
+    after_step(task, descent.best_loss());
+  }
+  return descent.best()[0];
+}
+
+}  // namespace uniphy
