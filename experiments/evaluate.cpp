@@ -8,9 +8,14 @@ int main(int argc, char** argv) {
       "unit cube; root_over_size its root divided by the largest side of the object in the first "
       "frame.\nkind: heldout judges a trained law: it draws materials, shapes and motions that "
       "training never saw, fits z alone to samples of each, and compares law and roll-outs with "
-      "the analytic ones.",
-      {"trajectory: two trajectories (trajectory.h5)", "heldout:    a trained model (model.h5)"},
-      {"trajectory:", "DIR/curve.csv       mean squared error of every frame",
+      "the analytic ones.\nkind: outside fits a trained law to the first half of motions by laws "
+      "that "
+      "it was not built around, and judges its forecast of the second half beside that of every "
+      "wrong analytic law. It goes on where it was interrupted.",
+      {"trajectory: two trajectories (trajectory.h5)", "heldout:    a trained model (model.h5)",
+       "outside:    a trained model (model.h5); observations (observation.h5) if asked for"},
+      {"trajectory:",
+       "DIR/curve.csv       mean squared error of every frame",
        "DIR/curve.png       its root over the size of the object",
        "DIR/metrics.json    position_mse, root_mse, root_over_size, largest_distance, final_mse,",
        "                    size, frames, and position_mse.BODY where there are several",
@@ -19,12 +24,20 @@ int main(int argc, char** argv) {
        "                    M (medians over heldout_all), with .worst; the same of",
        "                    heldout_materials after that prefix; rollouts_failed,",
        "                    frame_indifference, rest_drift (m)",
-       "DIR/errors.csv      every trajectory", "DIR/errors.md       the table",
+       "DIR/errors.csv      every trajectory",
+       "DIR/errors.md       the table",
        "DIR/rollout_errors.png, stress_errors.png, worst_rollout.png",
-       "DIR/heldout_all.h5, heldout_materials.h5, the sets, as uniphy_generate writes them"},
+       "DIR/heldout_all.h5, heldout_materials.h5, the sets, as uniphy_generate writes them",
+       "outside:",
+       "DIR/metrics.json    forecast.LAW, fit.LAW (root over size), rung.LAW, explained.LAW,",
+       "                    best_analytic.LAW: medians over scenes; the same of every scene with",
+       "                    .SCENE after LAW; fits, motions_failed",
+       "DIR/outside.md, outside.csv, forecast.png",
+       "DIR/fits            finished fits, which a later run of the same folder reads"},
       {"uniphy_evaluate configs/evaluate/trajectory.yaml --set trajectory=out/resim/trajectory.h5 "
        "--set reference=out/truth/trajectory.h5",
-       "uniphy_evaluate configs/evaluate/heldout.yaml --set seed=7"}};
+       "uniphy_evaluate configs/evaluate/heldout.yaml --set seed=7",
+       "uniphy_evaluate configs/evaluate/outside.yaml --set quick=true"}};
   return uniphy::run_experiment(
       argc, argv, info, [](uniphy::Section& config) { return uniphy::evaluate_stage(config); });
 }

@@ -4,26 +4,17 @@
 
 #include <set>
 
+#include "uniphy/evaluation/row_name.hpp"
+
 namespace uniphy {
 namespace {
-
-bool is_folder_name(const std::string& name) {
-  const auto plain = [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
-           c == '-' || c == '.';
-  };
-  for (const char c : name) {
-    if (!plain(c)) return false;
-  }
-  return !name.empty() && name[0] != '.' && name != "data";
-}
 
 void read_variants(Section& config, const TrainingOptions& base, AblationOptions& o) {
   std::set<std::string> names;
   for (Section& s : config.list("variants", "the laws that are compared", at_least(1))) {
     AblationVariant v;
     v.name = s.text("name", required, "of the row and of the folder");
-    if (!s.describing() && !is_folder_name(v.name)) {
+    if (!s.describing() && !(is_plain_name(v.name) && v.name != "data")) {
       s.fail("name", fmt::format("expected letters, digits, _, - and . (no dot first, not data), "
                                  "found \"{}\"",
                                  v.name));
@@ -34,6 +25,9 @@ void read_variants(Section& config, const TrainingOptions& base, AblationOptions
     v.group = s.text("group", "", "what is varied: variants of a group share a line of the charts");
     v.trajectories = s.integer("trajectories", o.draw.trajectories, between(1, 100000), "",
                                "of each material in the training set");
+    GenerateOptions set = o.draw;
+    read_random_laws(s, set);
+    v.random_laws = set.random_laws;
     v.training = read_training_options(s, base, false);
     o.variants.push_back(v);
   }
@@ -68,13 +62,19 @@ AblationOptions read_ablation_options(Section& config) {
   return o;
 }
 
-std::string AblationOptions::settings_of(const AblationVariant& v) const {
+GenerateOptions AblationOptions::training_set(const AblationVariant& v) const {
   GenerateOptions set = draw;
+  set.split = Split::train;
   set.trajectories = v.trajectories;
+  set.random_laws = v.random_laws;
+  return set;
+}
+
+std::string AblationOptions::settings_of(const AblationVariant& v) const {
   const std::string budget = budget_seconds ? fmt::format("budget {} s\n", *budget_seconds) : "";
   return fmt::format("{}\n{}fit: starts {}, steps {}, rate {}\nheld out {}\n", v.training.text(),
                      budget, fit.starts, fit.steps, fit.learning_rate, heldout_trajectories) +
-         generate_config(set);
+         generate_config(training_set(v));
 }
 
 }  // namespace uniphy

@@ -55,10 +55,14 @@ std::string ablation_table(const std::vector<AblationRow>& rows,
         percent(value(row, "projection_error")), percent(value(row, "rollout_error")),
         value(row, "rollouts_failed"));
   }
-  text += "\nMedians over all held-out trajectories. By material, the worst in brackets:\n";
-  for (const auto& [title, error] : {std::pair{"Roll-out", "rollout_error"},
-                                     {"Stress", "stress_error"},
-                                     {"Projection", "projection_error"}}) {
+  text +=
+      "\nMedians over all held-out trajectories, of the projection over those that project. By "
+      "material, the worst in brackets:\n";
+  for (const auto& [title, error] :
+       {std::pair{"Roll-out", "rollout_error"},
+        {"Stress", "stress_error"},
+        {"Projection, of trajectories that project", "projection_error"},
+        {"Projection, absolute, of those that do not", "unprojected_error"}}) {
     std::vector<ErrorRow> lines;
     for (const AblationRow& row : rows) lines.push_back({row.variant.name, &row.metrics, error});
     text += fmt::format("\n{}:\n\n", title) + error_table(lines, materials);

@@ -27,10 +27,12 @@ struct HeldoutSet {
 };
 
 Dataset training_set(const AblationOptions& o, const AblationVariant& v, const RunDirectory& out) {
-  GenerateOptions draw = o.draw;
-  draw.split = Split::train;
-  draw.trajectories = v.trajectories;
-  return drawn_dataset(draw, out.file("data") / fmt::format("train_{}.h5", v.trajectories));
+  const auto& [solids, fluids, plastics] = v.random_laws;
+  const std::string random = solids + fluids + plastics == 0
+                                 ? ""
+                                 : fmt::format("_random_{}_{}_{}", solids, fluids, plastics);
+  return drawn_dataset(o.training_set(v),
+                       out.file("data") / fmt::format("train_{}{}.h5", v.trajectories, random));
 }
 
 HeldoutSet heldout_set(const AblationOptions& o, const RunDirectory& out) {
@@ -72,6 +74,18 @@ void set_overall(Metrics& metrics, const std::string& name, const std::vector<do
   report_errors(data, values, name, metrics);
 }
 
+/// Medians over trajectories that project are not those over the others, whose errors are absolute.
+void set_law_errors(Metrics& metrics, const std::vector<LawError>& errors, const Dataset& data) {
+  std::vector<double> stress, projection;
+  for (const LawError& e : errors) {
+    stress.push_back(e.stress);
+    if (e.projects) projection.push_back(e.projection);
+  }
+  report_law_errors(data, errors, "", metrics);
+  metrics.set("stress_error", kernels::median(stress));
+  metrics.set("projection_error", projection.empty() ? 0.0 : kernels::median(projection));
+}
+
 Metrics make(const AblationVariant& variant, const AblationOptions& o, const HeldoutSet& heldout,
              const RunDirectory& all, const RunDirectory& out) {
   const Dataset data = training_set(o, variant, all);
@@ -95,16 +109,13 @@ Metrics make(const AblationVariant& variant, const AblationOptions& o, const Hel
   const auto laws = learned_laws(weights, fit.latents);
   metrics.set("law_ns", law_cost(laws.front(), heldout.data));
   const std::vector<RolloutError> rollouts = rollout_errors(heldout.setups, laws);
-  std::vector<double> stress, projection, rollout;
+  std::vector<double> rollout;
   double failed = 0;
   for (std::size_t i = 0; i < rollouts.size(); ++i) {
-    stress.push_back(fit.errors[i].stress);
-    projection.push_back(fit.errors[i].projection);
     rollout.push_back(rollouts[i].root_over_size);
     if (!rollouts[i].failure.empty()) ++failed;
   }
-  set_overall(metrics, "stress_error", stress, heldout.data);
-  set_overall(metrics, "projection_error", projection, heldout.data);
+  set_law_errors(metrics, fit.errors, heldout.data);
   set_overall(metrics, "rollout_error", rollout, heldout.data);
   metrics.set("rollouts_failed", failed);
   return metrics;

@@ -12,8 +12,9 @@ namespace uniphy {
 /// kept too.
 ///
 /// Metrics: for each variant NAME.parameters, .steps, .train_s, .law_ns (law_cost.hpp),
-/// .stress_error, .projection_error, .rollout_error (medians over all held-out trajectories), the
-/// same with .M of each material M and .M.worst, and .rollouts_failed.
+/// .stress_error, .projection_error, .rollout_error (medians over all held-out trajectories, of the
+/// projection over those that project), the same and .unprojected_error with .M of each material M
+/// and .M.worst, and .rollouts_failed.
 RunFunction ablation_stage(Section& config);
 
 }  // namespace uniphy

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <limits>
 
 namespace uniphy {
 namespace {
@@ -32,14 +31,14 @@ std::string error_table(const std::vector<ErrorRow>& rows,
   text += "\n" + rule + "\n";
   for (const ErrorRow& row : rows) {
     text += "| " + row.title + " |";
-    const bool projection = row.name.find("projection_error") != std::string::npos;
+    const bool relative = row.name.find("unprojected_error") == std::string::npos;
+    const auto show = relative ? percent : plain;
     for (const std::string& material : materials) {
-      const auto show = projection && material == "elastic" ? plain : percent;
       const auto value = [&](const char* ending) {
-        const auto found = row.metrics->find(row.name + "." + material + ending);
-        return found.value_or(std::numeric_limits<double>::quiet_NaN());
+        return row.metrics->find(row.name + "." + material + ending);
       };
-      text += fmt::format(" {} ({}) |", show(value("")), show(value(".worst")));
+      const auto median = value(""), worst = value(".worst");
+      text += median && worst ? fmt::format(" {} ({}) |", show(*median), show(*worst)) : " – |";
     }
     text += "\n";
   }

@@ -18,8 +18,7 @@ struct ErrorRow {
 };
 
 /// A Markdown table: a line a row, a column a material M, "median (worst)" from `<name>.M` and
-/// `<name>.M.worst`. A projection error is relative to the change that the law makes; elastic makes
-/// none and has an absolute one, so that entry is a plain number.
+/// `<name>.M.worst`, "–" where there is none. Errors are relative, but for unprojected_error.
 std::string error_table(const std::vector<ErrorRow>& rows,
                         const std::vector<std::string>& materials);
 

@@ -6,6 +6,7 @@
 
 #include "ops/kernels/base/error.hpp"
 #include "uniphy/evaluation/heldout_stage.hpp"
+#include "uniphy/evaluation/outside_stage.hpp"
 #include "uniphy/io/atomic_file.hpp"
 #include "uniphy/report/plot.hpp"
 #include "uniphy/scene/comparison.hpp"
@@ -84,12 +85,15 @@ RunFunction trajectory_stage(Section& config) {
 
 RunFunction evaluate_stage(Section& config) {
   RunFunction run;
-  config.variant("kind", std::string("trajectory"),
-                 {{"trajectory", "one trajectory against another",
-                   [&run](Section& keys) { run = trajectory_stage(keys); }},
-                  {"heldout", "a trained law on materials, shapes and motions it never saw",
-                   [&run](Section& keys) { run = heldout_stage(keys); }}},
-                 "what is evaluated");
+  config.variant(
+      "kind", std::string("trajectory"),
+      {{"trajectory", "one trajectory against another",
+        [&run](Section& keys) { run = trajectory_stage(keys); }},
+       {"heldout", "a trained law on materials, shapes and motions it never saw",
+        [&run](Section& keys) { run = heldout_stage(keys); }},
+       {"outside", "forecasts of motions by laws that the trained one was not built around",
+        [&run](Section& keys) { run = outside_stage(keys); }}},
+      "what is evaluated");
   return run;
 }
 

@@ -106,6 +106,8 @@ std::string markdown(const std::vector<EvaluatedSet>& sets, const HeldoutOptions
     const std::string beside = *prefix ? ", new materials" : "";
     rows.push_back({"stress" + beside, &metrics, std::string(prefix) + "stress_error"});
     rows.push_back({"projection" + beside, &metrics, std::string(prefix) + "projection_error"});
+    rows.push_back({"projection, absolute, where nothing is projected" + beside, &metrics,
+                    std::string(prefix) + "unprojected_error"});
     rows.push_back({"roll-out" + beside, &metrics, std::string(prefix) + "rollout_error"});
   }
   std::size_t rollouts = 0;

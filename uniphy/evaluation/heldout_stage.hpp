@@ -9,7 +9,8 @@ namespace uniphy {
 /// Draws heldout_materials and heldout_all from the seed, as uniphy_generate does, fits z alone to
 /// the samples of every trajectory, and compares law and roll-outs with the analytic ones.
 /// Metrics, M a material, medians over the trajectories of heldout_all with the worst beside them:
-///   stress_error.M, projection_error.M    law errors (uniphy/training/law_error.hpp)
+///   stress_error.M, projection_error.M    law errors (uniphy/training/law_error.hpp); the latter
+///   unprojected_error.M                   over trajectories that project, and over the others
 ///   rollout_error.M                       √position_mse / object size (rollout_error.hpp)
 ///   stress_error.M.worst, ...
 ///   heldout_materials.stress_error.M, ... the same over heldout_materials

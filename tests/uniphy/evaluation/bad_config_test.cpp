@@ -38,8 +38,9 @@ TEST_P(BadEvaluation, IsRefused) {
 INSTANTIATE_TEST_SUITE_P(
     Evaluate, BadEvaluation,
     ::testing::Values(
-        BadConfig{"UnknownKind", evaluate_stage, "kind: rollout\n",
-                  "c.yaml:1: kind: expected one of trajectory, heldout, found \"rollout\""},
+        BadConfig{
+            "UnknownKind", evaluate_stage, "kind: rollout\n",
+            "c.yaml:1: kind: expected one of trajectory, heldout, outside, found \"rollout\""},
         BadConfig{"NoTrajectory", evaluate_stage, "frames: all\n",
                   "c.yaml:1: trajectory: required key is missing, expected a file"},
         BadConfig{
@@ -64,6 +65,33 @@ INSTANTIATE_TEST_SUITE_P(
                   "c.yaml:3: rest.steps: expected an integer >= 1, found \"0\""},
         BadConfig{"FewAtRest", evaluate_stage, "kind: heldout\nmodel: '@'\nrest: {particles: 7}\n",
                   "c.yaml:3: rest.particles: expected an integer in [8, 100000], found \"7\""}),
+    [](const auto& info) { return std::string(info.param.name); });
+
+INSTANTIATE_TEST_SUITE_P(
+    Outside, BadEvaluation,
+    ::testing::Values(
+        BadConfig{
+            "NameOfAPath", evaluate_stage,
+            "kind: outside\nmodel: '@'\nlaws:\n  - {name: a/b, law: {type: water, lambda: 1e5}}\n",
+            "c.yaml:4: laws.0.name: expected letters, digits, _, - and . (no dot first), found "
+            "\"a/b\""},
+        BadConfig{
+            "SameNames", evaluate_stage,
+            "kind: outside\nmodel: '@'\nlaws:\n  - {name: a, law: {type: water, lambda: 1e5}}\n"
+            "observations:\n  - {name: a, file: '@'}\n",
+            "c.yaml:6: observations.0.name: expected names that differ, found \"a\" twice"},
+        BadConfig{
+            "NoFile", evaluate_stage,
+            "kind: outside\nmodel: '@'\nobservations:\n  - {name: a, file: none.h5}\n",
+            "c.yaml:4: observations.0.file: expected a file, found \"none.h5\", which does not "
+            "exist"},
+        BadConfig{
+            "LawWithoutNumbers", evaluate_stage,
+            "kind: outside\nmodel: '@'\nlaws:\n  - {name: a, law: {type: water}}\n",
+            "c.yaml:4: laws.0.law.lambda: required key is missing, expected a finite number > 0 "
+            "(Pa)"},
+        BadConfig{"FewSteps", evaluate_stage, "kind: outside\nmodel: '@'\nscene: {steps: 5}\n",
+                  "c.yaml:3: scene.steps: expected an integer in [20, 1000000], found \"5\""}),
     [](const auto& info) { return std::string(info.param.name); });
 
 INSTANTIATE_TEST_SUITE_P(

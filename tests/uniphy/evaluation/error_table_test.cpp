@@ -25,17 +25,19 @@ TEST(ErrorTable, MediansWithTheWorstBeside) {
   metrics.set("stress_error.sand", 0.1);
   metrics.set("stress_error.sand.worst", std::numeric_limits<double>::infinity());
   // What elastic projects is not relative to anything.
-  metrics.set("projection_error.elastic", 0);
-  metrics.set("projection_error.elastic.worst", 5.2e-7);
+  metrics.set("unprojected_error.elastic", 0);
+  metrics.set("unprojected_error.elastic.worst", 5.2e-7);
   metrics.set("projection_error.sand", 0.05);
   metrics.set("projection_error.sand.worst", 0.06);
   EXPECT_EQ(error_table({{"stress", &metrics, "stress_error"},
-                         {"projection", &metrics, "projection_error"}},
+                         {"projection", &metrics, "projection_error"},
+                         {"absolute", &metrics, "unprojected_error"}},
                         {"elastic", "sand"}),
             "| | elastic | sand |\n"
             "|---|---|---|\n"
             "| stress | 0.48 % (2.6 %) | 10 % (fails) |\n"
-            "| projection | 0 (5e-07) | 5 % (6 %) |\n");
+            "| projection | – | 5 % (6 %) |\n"
+            "| absolute | 0 (5e-07) | – |\n");
 }
 
 }  // namespace

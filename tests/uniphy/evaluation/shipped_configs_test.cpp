@@ -49,6 +49,17 @@ TEST(ShippedConfigs, EvaluateHeldOutSets) {
   EXPECT_NO_THROW(config.finish());
 }
 
+TEST(ShippedConfigs, EvaluateLawsFromOutside) {
+  const testing::Scratch scratch;
+  const std::string model = "model=" + scratch.write("model.h5", "").string();
+  for (const char* quick : {"quick=true", "quick=false"}) {
+    const Config config = Config::load(kConfigs / "evaluate/outside.yaml", {model, quick});
+    Section root = config.root();
+    evaluate_stage(root);
+    EXPECT_NO_THROW(config.finish());
+  }
+}
+
 TEST(ShippedConfigs, AblateEverySizeOfTheIssue) {
   const Config config = Config::load(kConfigs / "ablation/ablation.yaml");
   Section root = config.root();
