@@ -182,6 +182,7 @@ void run(const OutsideOptions& o, RunDirectory& out, Metrics& metrics) {
   const std::size_t fits = todo.size() * all.size();
   std::vector<OutsideCell> cells;
   std::size_t done = 0, failed = 0;
+  std::string reason;
   for (const Motion& motion : todo) {
     std::optional<Observation> seen;
     try {
@@ -189,6 +190,7 @@ void run(const OutsideOptions& o, RunDirectory& out, Metrics& metrics) {
     } catch (const Error& error) {
       std::fprintf(stderr, "warning: %s in %s: left out: %s\n", motion.law.c_str(),
                    motion.scene.c_str(), error.what());
+      reason = error.what();
       ++failed;
     }
     for (const Contender& by : all) {
@@ -203,7 +205,7 @@ void run(const OutsideOptions& o, RunDirectory& out, Metrics& metrics) {
     write_text_file(out.file("outside.md"), outside_table(cells));
     write_text_file(out.file("outside.csv"), outside_csv(cells));
   }
-  if (cells.empty()) throw Error("none of the motions could be made");
+  if (cells.empty()) throw Error("none of the motions could be made: " + reason);
   add_outside_metrics(cells, metrics);
   metrics.set("fits", static_cast<double>(cells.size()));
   metrics.set("motions_failed", static_cast<double>(failed));

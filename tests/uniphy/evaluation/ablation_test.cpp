@@ -33,14 +33,14 @@ TEST(Ablation, KeepsFinishedVariants) {
   const Metrics first = testing::run_stage(ablation_stage, yaml, scratch.file("out"));
   EXPECT_EQ(first.find("base.steps"), 12);
   // (3 + 4) 8 + 8 + (8 · 4 + 4) for the caps, (6 + 4) 8 + 8 + (8 · 8 + 8) for the stress.
-  EXPECT_EQ(first.find("base.parameters"), 56 + 8 + 36 + 80 + 8 + 72);
+  EXPECT_EQ(first.find("base.parameters"), 56 + 8 + 45 + 80 + 8 + 126);
   for (const char* name : {"law_ns", "train_s", "stress_error", "rollout_error.sand.worst",
                            "projection_error.newtonian", "rollouts_failed"}) {
     EXPECT_TRUE(first.find(std::string("published.") + name)) << name;
   }
   EXPECT_GT(*first.find("base.law_ns"), 0);
   const std::string table = read_text_file(scratch.file("out/ablation.md"));
-  EXPECT_THAT(table, HasSubstr("| base | isotropic | 1 x 8 | 4 | 5 x 2 | 260 | 12 | "));
+  EXPECT_THAT(table, HasSubstr("| base | isotropic | 1 x 8 | 4 | 5 x 2 | 323 | 12 | "));
   EXPECT_THAT(table, HasSubstr("| published | published | 1 x 6 | 4 | 5 x 1 | "));
   const std::string csv = read_text_file(scratch.file("out/ablation.csv"));
   EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 3);

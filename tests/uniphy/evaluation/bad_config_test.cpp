@@ -91,7 +91,7 @@ INSTANTIATE_TEST_SUITE_P(
             "c.yaml:4: laws.0.law.lambda: required key is missing, expected a finite number > 0 "
             "(Pa)"},
         BadConfig{"FewSteps", evaluate_stage, "kind: outside\nmodel: '@'\nscene: {steps: 5}\n",
-                  "c.yaml:3: scene.steps: expected an integer in [20, 1000000], found \"5\""}),
+                  "c.yaml:3: scene.steps: expected an integer in [20, 1e+06], found \"5\""}),
     [](const auto& info) { return std::string(info.param.name); });
 
 INSTANTIATE_TEST_SUITE_P(
