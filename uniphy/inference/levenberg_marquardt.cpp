@@ -21,6 +21,8 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// Dampings that are tried at once, in multiples of the one that served last.
 constexpr std::array<double, 4> kTrials{1e-2, 1e-1, 1, 10};
+/// Share of the gain that the linear model predicts from which a step is as good as it says.
+constexpr double kGoodGain = 0.25;
 /// How often the damping grows by kGrowth before a step is given up.
 constexpr int kRounds = 3;
 constexpr double kGrowth = 1e4;
@@ -148,6 +150,7 @@ LevenbergMarquardt::Trial LevenbergMarquardt::best_trial(const Residuals& residu
         if (A(k, k) == 0) step[k] = 0;
       }
       trial.point = moved(here, step);
+      trial.predicted = -(2 * g.dot(step) + step.dot(A * step));
       if (step.allFinite()) trial.residuals = residuals(trial.point);
       trial.loss = loss_of(trial.residuals);
     });
@@ -155,6 +158,10 @@ LevenbergMarquardt::Trial LevenbergMarquardt::best_trial(const Residuals& residu
     for (const Trial& trial : trials) {
       if (trial.loss < best.loss) best = trial;
     }
+    const auto good = std::find_if(trials.begin(), trials.end(), [&](const Trial& trial) {
+      return trial.loss < loss_ && loss_ - trial.loss >= kGoodGain * trial.predicted;
+    });
+    if (good != trials.end()) best = *good;
     if (best.loss < loss_ || damping_ > kLargestDamping) break;
     damping_ *= kGrowth;
   }

@@ -24,8 +24,10 @@ struct LevenbergMarquardtOptions
 /// 1963). The Jacobian comes from forward differences, a column an evaluation. With
 /// A = JᵀJ and g = Jᵀr the step solves
 ///   (A + λ D) δ = −g,   Dᵢᵢ = max(Aᵢᵢ, 1e-6 max Aₖₖ),
-/// for several λ at once, since an evaluation is cheap beside a Jacobian; the lowest of their ends
-/// is taken, and its λ is where the next step looks. Where none is lower, λ grows.
+/// for several λ at once, since an evaluation is cheap beside a Jacobian. The least λ is taken
+/// whose end is lower by a quarter of what the linear model says (J. Moré, 1978), else that of the
+/// lowest end, which alone would follow the floor of a curved valley in short steps; there the next
+/// step looks. Where none is lower, λ grows.
 ///
 /// A number that moves nothing (a column of zeros) stays where it is. Evaluations run side by side
 /// (kernels::for_each); sums have one order, so that results have the same bits on any number of
@@ -59,6 +61,7 @@ class LevenbergMarquardt : public torch::optim::Optimizer {
   struct Trial {
     torch::Tensor point, residuals;
     double loss = 0, damping = 0;
+    double predicted = 0;  ///< what the linear model says that the loss falls by
   };
 
   const LevenbergMarquardtOptions& options() const;

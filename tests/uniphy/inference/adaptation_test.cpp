@@ -52,8 +52,8 @@ struct Outside {
   explicit Outside(double change = 0.4) {
     kernels::LawDescription law = variables->law(variables->start(2));
     auto weights = std::make_shared<kernels::LearnedLawWeights>(*law.weights);
-    weights->stress.layers.back().bias[kernels::kShearExponent] += 5 * change;
-    weights->stress.layers.back().bias[kernels::kVolumeDelta] -= 5 * change;
+    weights->stress.layers.back().bias[kernels::kShearExponent] += 8 * change;
+    weights->stress.layers.back().bias[kernels::kVolumeDelta] -= 8 * change;
     law.weights = weights;
     observation = testing::observe(law, small());
   }
@@ -71,10 +71,13 @@ TEST(Adaptation, ALawOfTheFamilyStopsAtItsCode) {
       adapt(inside.observation, "o", *inside.variables, schedule(), {}, quiet());
   EXPECT_EQ(found.rung, Rung::latent);
   ASSERT_EQ(found.rungs.size(), 1u);
-  EXPECT_LT(found.rungs[0].fitted, 1e-4);
-  EXPECT_LT(found.rungs[0].kept, 1e-4);
+  // The initial velocity comes from frames: the true code itself, start 2, leaves an error too.
+  const double truth = std::sqrt(found.fit.start_mse[2]) / 0.225;
+  EXPECT_LT(truth, 3e-5);
+  EXPECT_LE(found.rungs[0].fitted, 1.01 * truth);
+  EXPECT_LE(found.rungs[0].kept, 3 * truth);
   EXPECT_GT(found.rungs[0].roll_outs, 8);
-  EXPECT_LT(std::sqrt(found.fit.mse) / 0.225, 1e-4);
+  EXPECT_LE(std::sqrt(found.fit.mse) / 0.225, 1.5 * truth);
   EXPECT_EQ(found.fit.u.size(), 4u);
 }
 
@@ -84,7 +87,7 @@ TEST(Adaptation, TheLawsOwnNumbersAreFound) {
       adapt(outside.observation, "o", *outside.variables, schedule(), two_rungs(), quiet());
   EXPECT_EQ(found.rung, Rung::numbers);
   ASSERT_EQ(found.rungs.size(), 2u);
-  EXPECT_GT(found.rungs[0].kept, 4e-4);
+  EXPECT_GT(found.rungs[0].kept, 1e-3);
   EXPECT_LT(found.rungs[1].kept, 0.05 * found.rungs[0].kept);
   EXPECT_LT(found.rungs[1].fitted, 3e-4);
   EXPECT_THAT(rung_table(found.rung, found.rungs), HasSubstr("numbers"));

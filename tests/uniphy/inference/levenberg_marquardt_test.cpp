@@ -17,9 +17,9 @@ using torch::Tensor;
 
 Tensor numbers(const std::vector<double>& x) { return torch::tensor(x, torch::kFloat64); }
 
-/// r = (x₁ − 1, 10 (x₀ x₁ − 2), x₀² − 4): zero at (2, 1), with influences tenfold apart.
+/// r = (x₁ − 1, 1000 (x₀ x₁ − 2), x₀² − 4): zero at (2, 1), with influences a thousandfold apart.
 Tensor curved(const Tensor& x) {
-  return torch::stack({x[1] - 1, 10 * (x[0] * x[1] - 2), x[0].square() - 4});
+  return torch::stack({x[1] - 1, 1000 * (x[0] * x[1] - 2), x[0].square() - 4});
 }
 
 int steps_until_done(LevenbergMarquardt& optimizer,

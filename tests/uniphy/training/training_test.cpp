@@ -275,7 +275,7 @@ TEST_F(TrainingTest, CapsShareAndPriorWeightAreOptions) {
 TEST_F(TrainingTest, FindsTheCodeOfKnownSamples) {
   const Dataset data = small_data(200, 1);
   TrainingOptions o = small_options();
-  o.steps = 300;
+  o.steps = 600;
   o.learning_rate = 1e-2;
   const models::TrainedModel trained = train(data, o, directory_ / "c.pt").model;
   const auto weights = std::make_shared<kernels::LearnedLawWeights>(trained.law->weights());
@@ -286,7 +286,7 @@ TEST_F(TrainingTest, FindsTheCodeOfKnownSamples) {
                                       trained.codes->material_parameters());
   const LawColumns columns = law_columns(data, o.law.form);
   LatentFitOptions fit;
-  fit.steps = 400;
+  fit.steps = 200;
   fit.starts = 2;
   const Tensor z = fit_latents(columns, shifted, fit);
   const auto best = errors_of(trained.codes->z), fitted = errors_of(z);
@@ -297,9 +297,9 @@ TEST_F(TrainingTest, FindsTheCodeOfKnownSamples) {
       const Tensor alike = shifted.codes->z[k].expand_as(shifted.codes->z);
       start = std::min(start, errors_of(alike)[i].stress);
     }
-    // Found: a part of what the best start has, which is 65 to 90 %.
+    // Found: 1 to 6 % of what the best start has, which is 70 to 90 %.
     EXPECT_GE(start, 0.5);
-    EXPECT_LE(fitted[i].stress, 0.3 * start);
+    EXPECT_LE(fitted[i].stress, 0.2 * start);
   }
 
   // Where every start fails, a training code answers.
