@@ -61,7 +61,8 @@ class Law(Eager):
 
     # The default of project's dt is FLOW_STEP, kFlowStep of ops/kernels/learned.
     def check_step(self, dt: float) -> None:
-        assert dt > 0.0, "uniphy law: dt: expected a time step above 0 s, found {}".format(dt)
+        assert dt > 0.0 and dt < float("inf"), (
+            "uniphy law: dt: expected a time step above 0 s, found {}".format(dt))
 
     # The code of the first training trajectory of a material, [Z].
     def code_of(self, material: str) -> Tensor:

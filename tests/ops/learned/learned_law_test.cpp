@@ -10,8 +10,8 @@
 #include <tuple>
 
 #include "ops/kernels/base/error.hpp"
-#include "ops/reference/isotropic_tensors.hpp"
 #include "ops/reference/learned_law.hpp"
+#include "tests/support/deformation_tensors.hpp"
 #include "tests/support/law_cases.hpp"
 #include "tests/support/random_weights.hpp"
 
@@ -20,30 +20,12 @@ namespace {
 
 using kernels::Activation;
 using kernels::LawForm;
+using testing::generic_deformations;
+using testing::relative;
+using testing::tensor_of;
 using torch::Tensor;
 
 constexpr double kStressUnit = 1e4;
-
-Tensor tensor_of(const std::vector<testing::Matrix>& all) {
-  Tensor t = torch::empty({int64_t(all.size()), 3, 3}, torch::kFloat64);
-  for (std::size_t p = 0; p < all.size(); ++p)
-    std::copy(all[p].begin(), all[p].end(), t.data_ptr<double>() + 9 * p);
-  return t;
-}
-
-/// Random rotations around singular values exp(strain · normal).
-Tensor generic_deformations(int count, double strain, unsigned seed) {
-  std::mt19937_64 random(seed);
-  std::normal_distribution<double> normal(0, strain);
-  std::vector<testing::Matrix> all;
-  for (int p = 0; p < count; ++p) {
-    const auto sigma = testing::diagonal(std::exp(normal(random)), std::exp(normal(random)),
-                                         std::exp(normal(random)));
-    all.push_back(testing::composed(testing::random_rotation(random), sigma,
-                                    testing::random_rotation(random)));
-  }
-  return tensor_of(all);
-}
 
 /// One tensor for each group of the gradient table, without the states whose singular values are
 /// closer than `gap`.
@@ -63,10 +45,6 @@ std::vector<std::pair<std::string, Tensor>> grouped_deformations(double gap) {
   groups.emplace_back("small strain", generic_deformations(150, 1e-4, 4));
   groups.emplace_back("F = I", torch::eye(3, torch::kFloat64).repeat({3, 1, 1}));
   return groups;
-}
-
-double relative(const Tensor& a, const Tensor& b) {
-  return (a - b).norm().item<double>() / std::max(b.norm().item<double>(), 1e-300);
 }
 
 struct Gradients {
@@ -448,6 +426,8 @@ TEST(LearnedLawOpErrors, NameTheArgument) {
             "learned law: z: expected [4] Float on cpu, found [3] Float on cpu");
   EXPECT_EQ(message_of([&] { learned_stress(w, F, Tensor(), z); }),
             "learned law: C: expected [5, 3, 3] Float on cpu, found an undefined tensor");
+  EXPECT_EQ(message_of([&] { learned_project(w, F, z, 0); }),
+            "learned law: dt: expected a time step above 0 s, found 0.000000");
   const auto spoilt = [&](const std::function<void(LearnedNetworks&)>& spoil) {
     LearnedNetworks other = w;
     spoil(other);
@@ -485,37 +465,6 @@ TEST(LearnedLawOpCache, SeesEveryChangeOfTheNumbers) {
   EXPECT_FALSE(torch::equal(learned_law(w, F, C, z).tau, tau));
   w.stress.numbers.data_ptr<double>()[w.stress.numbers.numel() - 8] -= 1;
   EXPECT_LE(relative(learned_law(w, F, C, z).tau, tau), 1e-12);
-}
-
-TEST(SignedSvdReference, IsTheSignedConvention) {
-  const Tensor F = torch::cat({generic_deformations(50, 0.5, 1), -generic_deformations(50, 0.5, 2),
-                               torch::zeros({1, 3, 3})});
-  const reference::SignedSvd s = reference::signed_svd(F);
-  EXPECT_LE(relative(s.U.matmul(torch::diag_embed(s.sigma)).matmul(s.V.mT()), F), 1e-14);
-  EXPECT_LE((torch::linalg_det(s.U) - 1).abs().max().item<double>(), 1e-13);
-  EXPECT_LE((torch::linalg_det(s.V) - 1).abs().max().item<double>(), 1e-13);
-  const Tensor magnitude = s.sigma.abs();
-  EXPECT_TRUE((magnitude.slice(1, 0, 2) >= magnitude.slice(1, 1, 3)).all().item<bool>());
-  EXPECT_TRUE((s.sigma.slice(1, 0, 2) >= 0).all().item<bool>());
-}
-
-TEST(HenckyTensorReference, DerivativeIsExactAtEveryGap) {
-  for (const auto& c : testing::deformation_cases()) {
-    SCOPED_TRACE(c.group);
-    const Tensor F = tensor_of({c.F}).requires_grad_();
-    torch::manual_seed(2);
-    const Tensor G = torch::randn({1, 3, 3}, torch::kFloat64);
-    const Tensor dF = torch::randn({1, 3, 3}, torch::kFloat64);
-    const Tensor value =
-        (torch::autograd::grad({(G * reference::hencky_tensor(F)).sum()}, {F})[0] * dF).sum();
-    const torch::NoGradGuard guard;
-    const auto f = [&](double s) {
-      return (G * reference::hencky_tensor(F + s * dF)).sum().item<double>();
-    };
-    const double h = c.step;
-    const double expected = (8 * (f(h) - f(-h)) - (f(2 * h) - f(-2 * h))) / (12 * h);
-    EXPECT_NEAR(value.item<double>(), expected, 1e-6 * (1 + std::abs(expected)));
-  }
 }
 
 }  // namespace
