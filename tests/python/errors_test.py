@@ -51,7 +51,7 @@ class Errors(unittest.TestCase):
             (lambda: ops.learned_stress(F, F, z, **dict(networks, stress_widths=[11])),
              "learned_stress: stress_widths: expected two or more, found 1"),
             (lambda: ops.learned_law(F, F, z[:4], **networks), "projection.widths: expected "
-             "[7, ..., 4] (features and latent first, outputs last), found [8, 8, 4]"),
+             "[7, ..., 5] (features and latent first, outputs last), found [8, 8, 5]"),
             (lambda: rollout(["learned"], [z]),
              "rollout: a body is learned: expected form, activation, projection_widths, "),
             (lambda: rollout(["elastic", "sand"]), "rollout: expected as many laws as parameters "
