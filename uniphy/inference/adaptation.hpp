@@ -5,6 +5,7 @@
 
 #include "uniphy/inference/adapted_variables.hpp"
 #include "uniphy/inference/fit.hpp"
+#include "uniphy/inference/rung_report.hpp"
 
 namespace uniphy {
 
@@ -25,16 +26,6 @@ struct AdaptationOptions {
   double rate = 0.01;               ///< likewise
 };
 
-/// What a rung came to.
-struct RungReport {
-  Rung rung = Rung::latent;
-  /// Root of the mean square error over size, on the frames that were fitted and on those kept;
-  /// infinite where the roll-out fails.
-  double fitted = 0, kept = 0;
-  int roll_outs = 0;
-  double seconds = 0;  ///< of the runs that finished its steps
-};
-
 struct Adaptation {
   FitResult fit;  ///< of the rung chosen; its u is that of the latent variables
   Rung rung = Rung::latent;
@@ -51,9 +42,11 @@ struct Adaptation {
 /// 2. The frames that were kept decide. The ladder ends where a rung explains both parts to
 ///    `enough` and the noise, or where the next one does not take away `gain` of the error on the
 ///    kept part; then the one before is the result.
-/// 3. Where z does not explain the motion, the best start of every other material goes up to
-///    `numbers` too, for a few iterations: the nearest code of the trained family may be of the
-///    wrong kind. The kept frames choose among them.
+/// 3. Not only the fitted z goes up to `numbers`: the best start of every other material does too,
+///    since the nearest code of the trained family may be of the wrong kind, and points at which
+///    the two terms of the elastic stress are apart (split_terms). They are fitted over horizons
+///    that grow as in the schedule, and half of them, those that forecast best up to the next one,
+///    go on.
 /// 4. The rung chosen is fitted to the whole observation, from where it is.
 ///
 /// Without a contact, with analytic variables, which have no rungs, and where `latent` is the only
@@ -63,11 +56,5 @@ struct Adaptation {
 Adaptation adapt(const Observation& observation, const std::string& name,
                  const FitVariables& variables, const FitOptions& options,
                  const AdaptationOptions& adaptation, const FitHooks& hooks = {});
-
-/// The first frames of an observation.
-Observation first_frames(const Observation& observation, std::ptrdiff_t frames);
-
-/// The rungs as a table, a line each.
-std::string rung_table(Rung chosen, const std::vector<RungReport>& rungs);
 
 }  // namespace uniphy

@@ -74,4 +74,17 @@ Tensor AdaptedVariables::widened(const AdaptedVariables& from, const Tensor& u) 
   return torch::cat({from.code(u.detach()), change.index_select(0, free_)});
 }
 
+Tensor AdaptedVariables::outputs(const Tensor& u) const {
+  const torch::NoGradGuard no_grad;
+  const ops::RolloutBody at = body(u, 0);
+  std::vector<Tensor> answers;
+  for (const ops::FlatLayers* layers : {&at.networks.projection, &at.networks.stress}) {
+    Tensor in = torch::zeros({1, layers->widths.front()}, torch::kFloat64);
+    const std::int64_t features = in.size(1) - at.parameters.numel();
+    in[0].slice(0, features, in.size(1)).copy_(at.parameters);
+    answers.push_back(ops::mlp(in, ops::layers_of(*layers), at.networks.activation)[0]);
+  }
+  return torch::cat(answers);
+}
+
 }  // namespace uniphy

@@ -39,6 +39,11 @@ class AdaptedVariables : public FitVariables {
 
   /// The point here that is the law of u, a point of `from`, a rung below or this one.
   torch::Tensor widened(const AdaptedVariables& from, const torch::Tensor& u) const;
+  kernels::LawForm form() const { return networks_.form; }
+  int latent_size() const { return latent_.size(); }
+  /// What the projection's and then the stress's network answer with where every feature of the
+  /// state is 0, [outputs] float64; the biases of `numbers` stand in the same order.
+  torch::Tensor outputs(const torch::Tensor& u) const;
   /// Coordinates of z in u.
   torch::Tensor code(const torch::Tensor& u) const { return u.slice(0, 0, latent_.size()); }
 

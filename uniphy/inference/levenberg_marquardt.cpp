@@ -20,7 +20,7 @@ using torch::Tensor;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// Dampings that are tried at once, in multiples of the one that served last.
-constexpr std::array<double, 4> kTrials{1e-2, 1e-1, 1, 10};
+constexpr std::array<double, LevenbergMarquardt::kTrials> kMultiples{1e-2, 1e-1, 1, 10};
 /// Share of the gain that the linear model predicts from which a step is as good as it says.
 constexpr double kGoodGain = 0.25;
 /// How often the damping grows by kGrowth before a step is given up.
@@ -138,11 +138,11 @@ LevenbergMarquardt::Trial LevenbergMarquardt::best_trial(const Residuals& residu
   best.loss = kInfinity;
   if (!(largest > 0)) return best;
   for (int round = 0; round < kRounds; ++round) {
-    std::array<Trial, kTrials.size()> trials;
+    std::array<Trial, kTrials> trials;
     kernels::for_each(static_cast<std::ptrdiff_t>(trials.size()), [&](std::ptrdiff_t i) {
       const torch::NoGradGuard no_grad;
       Trial& trial = trials[i];
-      trial.damping = kTrials[i] * damping_;
+      trial.damping = kMultiples[i] * damping_;
       Eigen::MatrixXd damped = A;
       damped.diagonal() += trial.damping * A.diagonal().cwiseMax(kFloor * largest);
       Eigen::VectorXd step = damped.ldlt().solve(-g);

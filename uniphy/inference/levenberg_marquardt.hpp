@@ -38,6 +38,9 @@ class LevenbergMarquardt : public torch::optim::Optimizer {
   /// there are none (the roll-out failed). Is called by several threads at the same time.
   using Residuals = std::function<torch::Tensor(const torch::Tensor& point)>;
 
+  /// Dampings that are tried at once.
+  static constexpr int kTrials = 4;
+
   /// The leaves, float64, are moved in place.
   LevenbergMarquardt(std::vector<torch::Tensor> leaves, const LevenbergMarquardtOptions& options);
 

@@ -126,6 +126,14 @@ std::vector<double> observed_mass(const Observation& observation) {
   return mass;
 }
 
+Observation first_frames(const Observation& observation, std::ptrdiff_t frames) {
+  Observation part = observation;
+  part.frames = frames;
+  part.time.resize(static_cast<std::size_t>(frames));
+  part.x.resize(static_cast<std::size_t>(3 * frames * observation.particles));
+  return part;
+}
+
 double observed_size(const Observation& observation) {
   Vector3d low = Map<const Vector3d>(observation.positions(0)), high = low;
   for (std::int64_t p = 1; p < observation.particles; ++p) {

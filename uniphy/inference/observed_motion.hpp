@@ -29,6 +29,9 @@ std::vector<double> observed_mass(const Observation& observation);
 /// Of the particles at a frame, m.
 Eigen::Vector3d centre_of_mass(const Observation& observation, std::ptrdiff_t frame);
 
+/// The first `frames` of an observation.
+Observation first_frames(const Observation& observation, std::ptrdiff_t frames);
+
 /// Largest side of the box round the particles at the first frame, m.
 double observed_size(const Observation& observation);
 

@@ -5,8 +5,6 @@
 #include <chrono>
 #include <cmath>
 
-#include "uniphy/inference/levenberg_marquardt.hpp"
-
 namespace uniphy {
 namespace {
 

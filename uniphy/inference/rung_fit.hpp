@@ -7,6 +7,7 @@
 #include "uniphy/inference/adaptation_state.hpp"
 #include "uniphy/inference/descent.hpp"
 #include "uniphy/inference/fit_problem.hpp"
+#include "uniphy/inference/levenberg_marquardt.hpp"
 
 namespace uniphy {
 

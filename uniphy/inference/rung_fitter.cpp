@@ -1,0 +1,103 @@
+#include "uniphy/inference/rung_fitter.hpp"
+
+#include <fmt/format.h>
+#include <torch/torch.h>
+
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "uniphy/inference/observed_motion.hpp"
+#include "uniphy/report/progress.hpp"
+
+namespace uniphy {
+
+using torch::Tensor;
+
+RungFitter::RungFitter(const Observation& observation, const std::string& name,
+                       const FitVariables& latent, const FitOptions& options,
+                       const AdaptationOptions& adaptation, const FitHooks& hooks)
+    : observation_(observation),
+      name_(name),
+      options_(options),
+      adaptation_(adaptation),
+      hooks_(hooks),
+      state_(adaptation_state_file(hooks.state_file), hooks),
+      size_(observed_size(observation)) {
+  for (const Rung rung : {Rung::latent, Rung::numbers, Rung::weights}) {
+    variables_.push_back(std::make_unique<AdaptedVariables>(latent, rung));
+  }
+}
+
+/// Differences of roll-outs want float64.
+FitOptions RungFitter::rung_options(bool differences) const {
+  FitOptions o = options_;
+  if (differences) o.dtype = "float64";
+  o.rollout = "fused";
+  o.pull = adaptation_.pull;
+  o.refine_velocity = false;
+  o.stages = {FitStage()};
+  return o;
+}
+
+RungReport& RungFitter::report(Rung rung) {
+  for (RungReport& r : reports_) {
+    if (r.rung == rung) return r;
+  }
+  reports_.emplace_back().rung = rung;
+  return reports_.back();
+}
+
+template <class Improve>
+Tensor RungFitter::work(Rung rung, const std::string& name, int steps, const Improve& improve) {
+  RungTask& task = state_.task(fmt::format("{} {}", rung_name(rung), name));
+  std::optional<Progress> progress;
+  if (hooks_.progress && !task.done) progress.emplace(task.name, steps, "roll-outs");
+  const Tensor point = improve(task, [&](const RungTask& at, double loss) {
+    if (hooks_.on_record) {
+      const int stage = static_cast<int>(options_.stages.size()) + static_cast<int>(rung);
+      hooks_.on_record(
+          {stage, 0, at.steps, std::numeric_limits<double>::infinity(), loss * size_ * size_});
+    }
+    state_.checkpoint(at.done);
+    if (progress) {
+      progress->update(at.roll_outs, fmt::format("root/size {:.2e}", std::sqrt(loss)));
+    }
+  });
+  report(rung).roll_outs += task.roll_outs;
+  report(rung).seconds += task.seconds;
+  return point;
+}
+
+Tensor RungFitter::least_squares(const Observation& seen, std::ptrdiff_t frames, Rung rung,
+                                 const Tensor& start, const std::string& task, int iterations) {
+  const FitOptions options = rung_options(true);
+  const FitProblem problem(seen, name_, variables(rung), options, &motion_);
+  const int roll_outs = iterations * (variables(rung).size() + LevenbergMarquardt::kTrials);
+  return work(rung, task, roll_outs, [&](RungTask& t, const AfterStep& after) {
+    return uniphy::least_squares(problem, start, frames, iterations, t, after);
+  });
+}
+
+Tensor RungFitter::descend(const Observation& seen, const Tensor& start, const std::string& task,
+                           int epochs) {
+  const FitOptions options = rung_options(false);
+  const FitProblem problem(seen, name_, variables(Rung::weights), options, &motion_);
+  const DescentOptions descent{adaptation_.optimizer, adaptation_.rate, epochs, options_.clip,
+                               epochs};
+  return work(Rung::weights, task, epochs, [&](RungTask& t, const AfterStep& after) {
+    return uniphy::descend(problem, start, descent, t, after);
+  });
+}
+
+std::vector<double> RungFitter::roots(const Tensor& point, Rung rung, std::ptrdiff_t frames) const {
+  const FitOptions options = rung_options(true);
+  const FitProblem whole(observation_, name_, variables(rung), options, &motion_);
+  FitCandidate candidate = whole.candidate(0);
+  candidate.u = point;
+  std::vector<double> root = whole.frame_mse(candidate, frames);
+  for (double& r : root) r = std::sqrt(r) / size_;
+  return root;
+}
+
+}  // namespace uniphy
