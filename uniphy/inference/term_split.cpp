@@ -20,7 +20,7 @@ double within(double x, double limit) { return std::clamp(x, -limit, limit); }
 std::vector<Tensor> split_terms(const AdaptedVariables& numbers, const Tensor& u) {
   if (numbers.form() != kernels::LawForm::isotropic) return {};
   const Tensor outputs = numbers.outputs(u);
-  const auto place = [](kernels::StressOutput o) { return kernels::kCapOutputs + o; };
+  const auto place = [](kernels::StressOutput o) { return int(kernels::kCapOutputs) + int(o); };
   const auto at = [&](kernels::StressOutput o) { return outputs[place(o)].item<double>(); };
   const auto coefficient = [&](kernels::StressOutput o) {
     return std::sinh(within(at(o), kernels::kSinhLimit));

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 #include <torch/torch.h>
 
+#include <array>
 #include <cmath>
 
 #include "tests/uniphy/inference/observed_scene.hpp"
@@ -41,7 +42,7 @@ TEST(AdaptedVariables, ANumberIsAddedToTheBiasOfItsOutput) {
   EXPECT_EQ(last_bias(after.weights->stress), stress);
   EXPECT_EQ(after.weights->stress.layers[0].weight, before.weights->stress.layers[0].weight);
   const Tensor moved = r.numbers.outputs(u) - r.latent.outputs(r.start);
-  EXPECT_NEAR(moved[kernels::kCapOutputs + kernels::kShear].item<double>(), -0.2, 1e-12);
+  EXPECT_NEAR(moved[int(kernels::kCapOutputs) + kernels::kShear].item<double>(), -0.2, 1e-12);
   EXPECT_NEAR(moved.abs().sum().item<double>(), 0.5, 1e-12);
 }
 
@@ -96,7 +97,7 @@ TEST(TermSplit, LeavesTheStressToSecondOrder) {
 TEST(TermSplit, ALawWithoutElasticShearHasNone) {
   const Rungs r;
   Tensor u = r.numbers.widened(r.latent, r.start);
-  const Tensor shear = r.numbers.outputs(u)[kernels::kCapOutputs + kernels::kShear];
+  const Tensor shear = r.numbers.outputs(u)[int(kernels::kCapOutputs) + kernels::kShear];
   u[4 + kernels::kCapOutputs + kernels::kShear] -= shear.item<double>();
   EXPECT_TRUE(split_terms(r.numbers, u).empty());
 }

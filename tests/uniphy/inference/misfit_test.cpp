@@ -3,6 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "tests/uniphy/inference/observed_scene.hpp"
 #include "tests/uniphy/support/scratch.hpp"
 #include "uniphy/inference/infer_run.hpp"
