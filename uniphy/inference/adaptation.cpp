@@ -23,6 +23,13 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// Iterations at each horizon that show which start is worth going on with: of water and jelly,
 /// begun from codes of other materials, the right ones are ahead after three.
 constexpr int kTrialIterations = 4;
+/// How strongly the law's own numbers are pulled to where they began (Pull::weight): on the first
+/// horizon, from one horizon to the next, and on the last one from one fit to the next. Without it
+/// the numbers that a short horizon hardly shows run off, and the fit ends where the next horizon
+/// cannot bring them back: the jelly cube's then ended at 1e-3 of the size for 3e-5 with it.
+constexpr double kFirstPull = 1e-3, kPullOfHorizons = 0.3, kPullOfFits = 0.1;
+/// The least of it, where there is no noise: what double roll-outs tell apart.
+constexpr double kLeastPull = 1e-6;
 /// Iterations, and the share of the epochs, of the last fit to the whole observation: it begins
 /// next to where it ends.
 constexpr int kLastIterations = 4;
@@ -32,6 +39,7 @@ constexpr int kLastShare = 4;
 struct Climber {
   std::string name;
   Tensor point;  ///< of the variables of its rung
+  Tensor start;  ///< where it began there
   double fitted = kInfinity, kept = kInfinity;
 };
 
@@ -58,7 +66,8 @@ class Ladder {
         adaptation_(adaptation),
         hooks_(hooks),
         fitter_(observation, name, latent, options, adaptation, hooks),
-        enough_(std::hypot(adaptation.enough, 2 * observed_noise(observation) / fitter_.size())) {}
+        noise_(observed_noise(observation) / fitter_.size()),
+        enough_(std::hypot(adaptation.enough, 2 * noise_)) {}
 
   Adaptation run() {
     Climber best = fit_latent();
@@ -77,6 +86,12 @@ class Ladder {
  private:
   bool pays(const Climber& next, const Climber& best) const {
     return std::isfinite(next.kept) && next.kept <= (1 - adaptation_.gain) * best.kept;
+  }
+
+  /// Noise tells a number with a spread of 1 from where it began by so much.
+  double least_pull() const {
+    const double coordinates = 3.0 * double(observation_.particles) * double(part_.frames);
+    return std::max(kLeastPull, noise_ / std::sqrt(coordinates));
   }
 
   /// The errors of the two parts.
@@ -109,9 +124,9 @@ class Ladder {
     fitter_.report(Rung::latent).roll_outs += task.roll_outs;
     fitter_.report(Rung::latent).seconds += task.seconds;
     fitter_.set_motion(result_.fit.motion);
-    Climber c{latent_.label(result_.fit.start), {}};
-    c.point = fitter_.least_squares(part_, part_.frames, Rung::latent, to_tensor(result_.fit.u),
-                                    "code", adaptation_.iterations);
+    Climber c{latent_.label(result_.fit.start), to_tensor(result_.fit.u), {}};
+    c.point = fitter_.least_squares(part_, part_.frames, Rung::latent, c.point,
+                                    {c.point, least_pull()}, "code", adaptation_.iterations);
     conclude(c, Rung::latent);
     return c;
   }
@@ -136,18 +151,18 @@ class Ladder {
     const auto add_split = [&](const std::string& name, const Tensor& point) {
       const std::vector<Tensor> apart = split_terms(to, point);
       for (std::size_t i = 0; i < apart.size(); ++i) {
-        climbers.push_back({fmt::format("{} split {}", name, i + 1), apart[i]});
+        climbers.push_back({fmt::format("{} split {}", name, i + 1), apart[i], {}});
       }
     };
     const Tensor point = to.widened(fitter_.variables(Rung::latent), code.point);
-    climbers.push_back({"code", point});
+    climbers.push_back({"code", point, {}});
     add_split("code", point);
     for (const auto& [material, i] : best_starts()) {
       const Tensor start = to_tensor(to.start(i));
       if (material == code.name) {
         add_split(material, start);
       } else {
-        climbers.push_back({material, start});
+        climbers.push_back({material, start, {}});
       }
     }
     return climbers;
@@ -167,10 +182,14 @@ class Ladder {
   /// Half of the climbers go on to the next horizon, those that forecast best up to it.
   Climber fit_numbers(const Climber& code) {
     std::vector<Climber> climbers = first_climbers(code);
+    for (Climber& c : climbers) c.start = c.point;
     const std::vector<std::ptrdiff_t> horizons = growing_horizons();
+    double pull = kFirstPull;
     for (std::size_t s = 0; s + 1 < horizons.size(); ++s) {
+      if (s > 0) pull *= kPullOfHorizons;
       for (Climber& c : climbers) {
         c.point = fitter_.least_squares(part_, horizons[s], Rung::numbers, c.point,
+                                        {c.start, std::max(pull, least_pull())},
                                         fmt::format("{} {}", c.name, s + 1), kTrialIterations);
         c.kept = root_mean_square(fitter_.roots(c.point, Rung::numbers, horizons[s + 1]),
                                   horizons[s], horizons[s + 1]);
@@ -180,8 +199,12 @@ class Ladder {
       climbers.resize((climbers.size() + 1) / 2);
     }
     Climber best = climbers.front();
-    best.point = fitter_.least_squares(part_, part_.frames, Rung::numbers, best.point, best.name,
-                                       adaptation_.iterations);
+    for (int k = 1; pull > least_pull(); ++k) {
+      pull = std::max(kPullOfFits * pull, least_pull());
+      best.point =
+          fitter_.least_squares(part_, part_.frames, Rung::numbers, best.point, {best.start, pull},
+                                fmt::format("{} last {}", best.name, k), adaptation_.iterations);
+    }
     conclude(best, Rung::numbers);
     return best;
   }
@@ -189,7 +212,8 @@ class Ladder {
   Climber fit_weights(const Climber& below) {
     Climber c{
         below.name,
-        fitter_.variables(Rung::weights).widened(fitter_.variables(result_.rung), below.point)};
+        fitter_.variables(Rung::weights).widened(fitter_.variables(result_.rung), below.point),
+        {}};
     c.point = fitter_.descend(part_, c.point, c.name, adaptation_.epochs);
     conclude(c, Rung::weights);
     return c;
@@ -204,7 +228,7 @@ class Ladder {
                      ? fitter_.descend(observation_, best.point, task,
                                        std::max(1, adaptation_.epochs / kLastShare))
                      : fitter_.least_squares(observation_, observation_.frames, rung, best.point,
-                                             task, kLastIterations);
+                                             {best.point, least_pull()}, task, kLastIterations);
     const AdaptedVariables& chosen = fitter_.variables(rung);
     const Tensor code = chosen.code(last.point).contiguous();
     FitResult& fit = result_.fit;
@@ -224,7 +248,7 @@ class Ladder {
   const AdaptationOptions& adaptation_;
   const FitHooks& hooks_;
   RungFitter fitter_;
-  double enough_;
+  double noise_, enough_;  ///< over size
   Adaptation result_;
 };
 

@@ -12,7 +12,8 @@ namespace uniphy {
 namespace {
 
 constexpr const char* kFormat = "uniphy-adaptation-state";
-constexpr std::int64_t kCounts = 4;  // columns of /counts
+constexpr int kVersion = 2;
+constexpr std::int64_t kCounts = 3;  // columns of /counts
 
 }  // namespace
 
@@ -52,18 +53,16 @@ void AdaptationState::write() const {
   for (const RungTask& task : tasks_) {
     names.push_back(task.name);
     optimizers.push_back(task.optimizer);
-    for (const int count : {task.steps, task.idle, int(task.done), task.roll_outs})
-      counts.push_back(count);
+    for (const int count : {task.steps, int(task.done), task.roll_outs}) counts.push_back(count);
     seconds.push_back(task.seconds);
   }
   const auto count = static_cast<std::int64_t>(names.size());
   hdf5::Writer writer(file_);
   writer.attribute("/", "format", kFormat);
-  writer.attribute("/", "version", 1);
+  writer.attribute("/", "version", kVersion);
   writer.attribute("/", "fingerprint", hooks_.fingerprint);
   writer.write_strings("names", names, {"1", "rung and start"});
-  writer.write("counts", counts, {count, kCounts},
-               {"1", "steps, those without gain at the end, done, roll-outs"});
+  writer.write("counts", counts, {count, kCounts}, {"1", "steps, done, roll-outs"});
   writer.write("seconds", seconds, {count}, {"s", "that the task took"});
   write_optimizers(writer, optimizers);
   writer.commit_sealed();
@@ -71,7 +70,7 @@ void AdaptationState::write() const {
 
 void AdaptationState::read() {
   const hdf5::Reader reader(file_);
-  reader.check_format(kFormat, 1);
+  reader.check_format(kFormat, kVersion);
   check_fingerprint(reader, hooks_.fingerprint);
   check_seal(file_);
   const auto names = reader.read_strings("names");
@@ -81,8 +80,8 @@ void AdaptationState::read() {
   const auto optimizers = read_optimizers(reader, count);
   for (std::size_t i = 0; i < names.size(); ++i) {
     const std::int64_t* row = counts.data() + i * kCounts;
-    tasks_.push_back({names[i], optimizers[i], static_cast<int>(row[0]), static_cast<int>(row[1]),
-                      row[2] != 0, static_cast<int>(row[3]), seconds[i]});
+    tasks_.push_back({names[i], optimizers[i], static_cast<int>(row[0]), row[1] != 0,
+                      static_cast<int>(row[2]), seconds[i]});
   }
 }
 

@@ -14,7 +14,6 @@ struct RungTask {
   std::string name;       ///< unique within a run
   std::string optimizer;  ///< its state after `steps`; empty: it has not begun
   int steps = 0;
-  int idle = 0;  ///< of the last steps, that gained next to nothing
   bool done = false;
   int roll_outs = 0;
   double seconds = 0;  ///< that it took, interrupted runs included

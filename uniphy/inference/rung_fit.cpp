@@ -25,27 +25,28 @@ class Stopwatch {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-constexpr double kLittleGain = 0.02;
-constexpr int kPatience = 2;
+/// Share of the loss that an iteration has to take away.
+constexpr double kLittleGain = 0.05;
 
 }  // namespace
 
-Tensor least_squares(const FitProblem& problem, const Tensor& start, std::ptrdiff_t frames,
-                     int iterations, RungTask& task, const AfterStep& after_step) {
+Tensor least_squares(const FitProblem& problem, const Tensor& start, const Pull& pull,
+                     std::ptrdiff_t frames, int iterations, RungTask& task,
+                     const AfterStep& after_step) {
   const Tensor leaf = start.detach().clone();
   LevenbergMarquardt optimizer({leaf}, LevenbergMarquardtOptions());
   if (task.steps > 0) optimizer.resume(task.optimizer);
   const auto residuals = [&](const Tensor& u) {
     const Tensor r = problem.residuals(u, frames);
-    return r.defined() ? torch::cat({r, std::sqrt(kWeakPrior) * (u - start)}) : r;
+    return r.defined() ? torch::cat({r, pull.weight * (u - pull.to)}) : r;
   };
   Stopwatch watch(task);
   while (!task.done) {
     const double before = optimizer.loss();
     const double loss = optimizer.step(residuals).item<double>();
     ++task.steps;
-    task.idle = loss < (1 - kLittleGain) * before ? 0 : task.idle + 1;
-    task.done = optimizer.stuck() || task.steps >= iterations || task.idle >= kPatience;
+    task.done =
+        optimizer.stuck() || task.steps >= iterations || !(loss < (1 - kLittleGain) * before);
     task.roll_outs = optimizer.evaluations();
     task.optimizer = optimizer.saved();
     watch.look();

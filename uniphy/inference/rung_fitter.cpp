@@ -70,12 +70,13 @@ Tensor RungFitter::work(Rung rung, const std::string& name, int steps, const Imp
 }
 
 Tensor RungFitter::least_squares(const Observation& seen, std::ptrdiff_t frames, Rung rung,
-                                 const Tensor& start, const std::string& task, int iterations) {
+                                 const Tensor& start, const Pull& pull, const std::string& task,
+                                 int iterations) {
   const FitOptions options = rung_options(true);
   const FitProblem problem(seen, name_, variables(rung), options, &motion_);
   const int roll_outs = iterations * (variables(rung).size() + LevenbergMarquardt::kTrials);
   return work(rung, task, roll_outs, [&](RungTask& t, const AfterStep& after) {
-    return uniphy::least_squares(problem, start, frames, iterations, t, after);
+    return uniphy::least_squares(problem, start, pull, frames, iterations, t, after);
   });
 }
 

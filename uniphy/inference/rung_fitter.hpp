@@ -29,7 +29,8 @@ class RungFitter {
   /// The point that least squares on the first `frames` of `seen`, the observation or its first
   /// part, lead to. `task` is unique within the rung.
   torch::Tensor least_squares(const Observation& seen, std::ptrdiff_t frames, Rung rung,
-                              const torch::Tensor& start, const std::string& task, int iterations);
+                              const torch::Tensor& start, const Pull& pull, const std::string& task,
+                              int iterations);
   /// The same of all weights, by at most `epochs` roll-outs with gradients over all frames.
   torch::Tensor descend(const Observation& seen, const torch::Tensor& start,
                         const std::string& task, int epochs);
