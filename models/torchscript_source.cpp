@@ -7,6 +7,7 @@
 #include "models/script_text.hpp"
 #include "ops/kernels/base/error.hpp"
 #include "ops/kernels/learned/power_law.hpp"
+#include "ops/kernels/learned/published_scales.hpp"
 #include "ops/kernels/spectral/limits.hpp"
 
 namespace uniphy::models {
@@ -73,6 +74,7 @@ std::map<std::string, double> script_constants(bool single_precision) {
           {"STRESS_RATE", kernels::kStressRate},
           {"STRAIN_SCALE", kernels::kStrainScale},
           {"STRAIN_RATE", kernels::kStrainRate},
+          {"DELTA_OVER_STRAIN", kernels::kDeltaOverStrain},
           {"TIME_SCALE", kernels::kTimeScale},
           {"SMOOTHING", kernels::kInvariantSmoothing},
           {"SINH_LIMIT", kernels::kSinhLimit},

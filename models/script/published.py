@@ -109,9 +109,12 @@ class Published(Law):
             V = V + torch.matmul(V, self.beside_diagonal(of_V, -of_V))
             sigma = sigma + torch.diagonal(B, 0, 1, 2)
         code = rows.expand(f.size(0), rows.size(1))
-        features = [f.flatten(1), U.flatten(1), sigma, V.transpose(1, 2).flatten(1), code]
-        change = self.projection_network(torch.hstack(features))
-        return (f + change.reshape(f.size())).to(F.dtype)
+        e = self.strain_scale(rows).unsqueeze(1)
+        rest = torch.eye(3, dtype=f.dtype, device=f.device).flatten().unsqueeze(0)
+        features = torch.hstack([f.flatten(1) - rest, U.flatten(1) - rest, sigma - 1.0,
+                                 V.transpose(1, 2).flatten(1) - rest]) / e
+        change = self.projection_network(torch.hstack([features, code]))
+        return (f + (self.DELTA_OVER_STRAIN * e * change).reshape(f.size())).to(F.dtype)
 
     def stress(self, F_proj: Tensor, C: Tensor, z: Tensor) -> Tensor:
         f = self.matrices("F_proj", F_proj, -1)
@@ -132,9 +135,12 @@ class Published(Law):
         J = (torch.linalg.cross(f[:, 0], f[:, 1]) * f[:, 2]).sum(1, keepdim=True)
         F_max = torch.clamp(f[:, 0, 0:1], min=1e-6)
         rate = torch.matmul(R.transpose(1, 2), torch.matmul(c, R)) * self.TIME_SCALE
-        features = [sigma, torch.matmul(f.transpose(1, 2), f).flatten(1), J,
-                    torch.log(torch.clamp(J, min=1e-6)), F_max, torch.log(F_max),
-                    rate.flatten(1), rows.expand(f.size(0), rows.size(1))]
-        S = self.stress_network(torch.hstack(features)).reshape(f.size())
+        rest = torch.eye(3, dtype=f.dtype, device=f.device).flatten().unsqueeze(0)
+        right = torch.matmul(f.transpose(1, 2), f).flatten(1)
+        features = torch.hstack([sigma - 1.0, right - rest, J - 1.0,
+                                 torch.log(torch.clamp(J, min=1e-6)), F_max - 1.0,
+                                 torch.log(F_max)]) / self.strain_scale(rows).unsqueeze(1)
+        code = rows.expand(f.size(0), rows.size(1))
+        S = self.stress_network(torch.hstack([features, rate.flatten(1), code])).reshape(f.size())
         tau = torch.matmul(R, torch.matmul(0.5 * (S + S.transpose(1, 2)), R.transpose(1, 2)))
         return (self.stress_scale(rows).unsqueeze(1).unsqueeze(2) * tau).to(F_proj.dtype)

@@ -4,6 +4,7 @@
 
 #include <limits>
 
+#include "ops/kernels/learned/published_scales.hpp"
 #include "ops/reference/isotropic_tensors.hpp"
 #include "ops/reference/mlp.hpp"
 
@@ -94,9 +95,13 @@ constexpr double kPublishedFloor = 1e-6;
 
 Tensor published_project(const LearnedNetworks& law, const Tensor& F, const Tensor& z) {
   const SignedSvd s = signed_svd(F);
+  const Tensor e = strain_scale(z), I = identity(F);
   const Tensor features =
-      torch::cat({F.flatten(1), s.U.flatten(1), s.sigma, s.V.mT().flatten(1)}, 1);
-  return F + network(law, law.projection, features, z).reshape(F.sizes());
+      torch::cat({(F - I).flatten(1), (s.U - I).flatten(1), s.sigma - 1, (s.V.mT() - I).flatten(1)},
+                 1) /
+      e.unsqueeze(-1);
+  const Tensor delta = network(law, law.projection, features, z).reshape(F.sizes());
+  return F + kernels::kDeltaOverStrain * at_matrix(e) * delta;
 }
 
 Tensor published_stress(const LearnedNetworks& law, const Tensor& F, const Tensor& C,
@@ -107,11 +112,13 @@ Tensor published_stress(const LearnedNetworks& law, const Tensor& F, const Tenso
   const Tensor J = (torch::linalg_cross(F.select(1, 0), F.select(1, 1)) * F.select(1, 2)).sum(1);
   const Tensor F_max = F.select(1, 0).select(1, 0).clamp_min(kPublishedFloor);
   const Tensor rate = R.mT().matmul(C).matmul(R) * kernels::kTimeScale;
-  const Tensor features =
-      torch::cat({s.sigma, F.mT().matmul(F).flatten(1), J.unsqueeze(1),
-                  J.clamp_min(kPublishedFloor).log().unsqueeze(1), F_max.unsqueeze(1),
-                  F_max.log().unsqueeze(1), rate.flatten(1)},
+  const Tensor of_strain =
+      torch::cat({s.sigma - 1, (F.mT().matmul(F) - identity(F)).flatten(1), J.unsqueeze(1) - 1,
+                  J.clamp_min(kPublishedFloor).log().unsqueeze(1), F_max.unsqueeze(1) - 1,
+                  F_max.log().unsqueeze(1)},
                  1);
+  const Tensor features =
+      torch::cat({of_strain / strain_scale(z).unsqueeze(-1), rate.flatten(1)}, 1);
   const Tensor S = network(law, law.stress, features, z).reshape(F.sizes());
   return at_matrix(stress_scale(z)) * R.matmul(symmetric(S)).matmul(R.mT());
 }

@@ -64,7 +64,7 @@ struct Training {
   }
 
   Objective objective(const ObjectiveOps& ops = {}) const {
-    return {columns, options.loss.measure(), ops};
+    return {columns, options.loss, ops};
   }
   void step(const Objective& objective) {
     training_step(objective, model, sampler.rows(0, batch), ReturnStage::actual, options,

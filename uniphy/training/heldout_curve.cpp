@@ -22,7 +22,7 @@ Tensor first_codes(const LawColumns& columns, const TrainingOptions& o) {
 
 HeldoutCurve::HeldoutCurve(const LawColumns& columns, const TrainingOptions& options)
     : options_(options),
-      objective_(columns, options.loss.measure()),
+      objective_(columns, options.loss),
       sampler_(columns.first, options.seed + kSeedShift),
       z_(first_codes(columns, options)),
       optimizer_({z_}, torch::optim::AdamOptions(options.learning_rate).betas({0.9, 0.99})) {}

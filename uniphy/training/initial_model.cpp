@@ -12,7 +12,7 @@ torch::Tensor initial_latents(const LawColumns& columns, std::int64_t latent_siz
   for (std::int64_t i = 0; i < n; ++i) {
     const TrajectoryScale& s = columns.scales[i];
     if (s.stress > 0) z[i][0] = std::log(s.stress / kernels::kStressScale) / kernels::kStressRate;
-    if (latent_size > 1 && columns.form == kernels::LawForm::isotropic && s.strain > 0)
+    if (latent_size > 1 && s.strain > 0)
       z[i][1] = std::log(std::min(std::max(s.strain, 1e-3), 0.5) / kernels::kStrainScale) /
                 kernels::kStrainRate;
   }

@@ -17,12 +17,12 @@ Tensor fit_latents(const LawColumns& columns, const models::TrainedModel& model,
                    const LatentFitOptions& o) {
   const models::LearnedLaw law = model.law->frozen();
   const Tensor training_z = model.codes->z.detach();
-  const Objective objective(columns, o.loss.measure());
+  const Objective objective(columns, o.loss);
   const BatchSampler sampler(columns.first, o.seed);
   const std::int64_t n = sampler.trajectories(), codes = training_z.size(0);
   const std::int64_t starts = std::min(o.starts, codes);
   const auto loss_of = [&](const Tensor& z, const Tensor& rows, const Tensor& of,
-                           ReturnStage stage = ReturnStage::either) {
+                           ReturnStage stage) {
     return Objective::loss(objective.errors(law, z, rows, of), stage);
   };
   // Which training codes answer best, a code at a time against all trajectories.
@@ -31,7 +31,8 @@ Tensor fit_latents(const LawColumns& columns, const models::TrainedModel& model,
     torch::NoGradGuard no_grad;
     const Tensor rows = sampler.rows(-1, 64), of = torch::arange(n);
     for (std::int64_t k = 0; k < codes; ++k)
-      scores[k] = loss_of(training_z[k].unsqueeze(0).expand({n, -1}), rows, of);
+      scores[k] =
+          loss_of(training_z[k].unsqueeze(0).expand({n, -1}), rows, of, ReturnStage::either);
   }
   const Tensor best = std::get<1>(scores.topk(starts, 0, /*largest=*/false));  // [starts, n]
   const Tensor initial = training_z.index_select(0, best.reshape({-1}));
@@ -46,7 +47,9 @@ Tensor fit_latents(const LawColumns& columns, const models::TrainedModel& model,
     optimizer.zero_grad();
     const Tensor rows = sampler.rows(step, o.batch_per_trajectory).repeat({starts, 1});
     const Tensor prior = z.pow(2).sum() / (o.loss.latent_sigma * o.loss.latent_sigma);
-    (loss_of(z, rows, of).sum() + prior * o.loss.prior_weight).backward();
+    const bool last = double(step) >= kActualFrom * double(o.steps);
+    const ReturnStage stage = last ? ReturnStage::actual : ReturnStage::either;
+    (loss_of(z, rows, of, stage).sum() + prior * o.loss.prior_weight).backward();
     optimizer.step();
     progress.update(step + 1);
   }

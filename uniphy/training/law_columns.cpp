@@ -22,6 +22,10 @@ Mat3 load(const std::vector<double>& values, std::int64_t sample) {
 void put(float* to, const Mat3& m) {
   for (int k = 0; k < 9; ++k) to[k] = float(m.e[k]);
 }
+Mat3 from_rest(Mat3 m) {
+  for (int k = 0; k < 9; k += 4) m.e[k] -= 1;
+  return m;
+}
 /// 00, 11, 22, 01, 02, 12
 void put_symmetric(float* to, const Mat3& m) {
   constexpr int kEntry[6] = {0, 4, 8, 1, 2, 5};
@@ -69,20 +73,20 @@ void isotropic_columns(const Sample& s, float* row) {
 void published_columns(const Sample& s, float* row) {
   using Column = PublishedColumns;
   float* in = row + Column::projection_in;
-  put(in, s.F);
-  put(in + 9, s.svd_F.U);
-  for (int i = 0; i < 3; ++i) in[18 + i] = float(s.svd_F.sigma[i]);
-  put(in + 21, transpose(s.svd_F.V_));
+  put(in, from_rest(s.F));
+  put(in + 9, from_rest(s.svd_F.U));
+  for (int i = 0; i < 3; ++i) in[18 + i] = float(s.svd_F.sigma[i] - 1);
+  put(in + 21, from_rest(transpose(s.svd_F.V_)));
   in = row + Column::stress_in;
   const Mat3 R = mult(s.svd_P.U, s.svd_P.V_);
-  for (int i = 0; i < 3; ++i) in[i] = float(s.svd_P.sigma[i]);
-  put(in + 3, tmul(s.P, s.P));
+  for (int i = 0; i < 3; ++i) in[i] = float(s.svd_P.sigma[i] - 1);
+  put(in + 3, from_rest(tmul(s.P, s.P)));
   const double J = determinant(s.P), F_max = std::max(s.P(0, 0), 1e-6);
-  in[12] = float(J);
+  in[12] = float(J - 1);
   in[13] = float(std::log(std::max(J, 1e-6)));
-  in[14] = float(F_max);
+  in[14] = float(F_max - 1);
   in[15] = float(std::log(F_max));
-  put(in + 16, tmul(R, mul(s.C, R)) * kernels::kTimeScale);
+  put(row + Column::rate_in, tmul(R, mul(s.C, R)) * kernels::kTimeScale);
   put(row + Column::delta, s.P - s.F);
   put(row + Column::stress, tmul(R, mul(s.tau, R)));
 }

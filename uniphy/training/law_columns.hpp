@@ -14,10 +14,11 @@ namespace uniphy {
 /// What the published form sees: its input features, Δ = F_proj − F, and Rᵀ τ R.
 struct PublishedColumns {
   enum Column {
-    projection_in = 0,  ///< F, U, Σ, Vᵀ: 30
-    stress_in = 30,  ///< Σ, FᵀF, J, log J, F_max, log F_max, RᵀCR t₀ of the projected F: 25
-    delta = 55,      ///< 9
-    stress = 64,     ///< Rᵀ τ R in Pa, 9
+    projection_in = 0,  ///< F, U, Σ, Vᵀ, less what they are at rest: 30
+    stress_in = 30,     ///< Σ, FᵀF, J, log J, F_max, log F_max of the projected F, likewise: 16
+    rate_in = 46,       ///< RᵀCR t₀: 9
+    delta = 55,         ///< 9
+    stress = 64,        ///< Rᵀ τ R in Pa, 9
     count = 73
   };
 };

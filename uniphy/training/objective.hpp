@@ -5,6 +5,7 @@
 #include "models/learned_law.hpp"
 #include "ops/loss/law_losses.hpp"
 #include "uniphy/training/law_columns.hpp"
+#include "uniphy/training/loss_options.hpp"
 
 namespace uniphy {
 
@@ -13,7 +14,8 @@ namespace uniphy {
 ///   ‖τ‖² + (floor · RMS of the trajectory)²          (stress)
 ///   decrease² + (floor · RMS of the trajectory)²     (projection; where the trajectory's own RMS
 ///                                                     is 0, an elastic one, ‖ε‖² takes its place)
-/// and enters the loss as log(1 + error/δ), so that no trajectory drowns the others.
+/// and enters the loss as log(1 + error/δ), so that no trajectory drowns the others; or, where the
+/// loss is `squared`, the squared errors do over the squared RMS alone.
 struct LawErrors {
   torch::Tensor stress_loss;
   torch::Tensor projection_loss;
@@ -27,12 +29,18 @@ struct LawErrors {
   torch::Tensor projection;
 };
 
-/// Which projection is judged: that of the law as it is (`actual`), of one that returns the whole
+/// Which projection is judged: that of the law as it is, its share pulled to 1 if it is close to it
+/// (`actual`), of one that returns the whole
 /// way to its caps and has its share pulled to 1 (`whole`), or whichever is less (`either`). As
 /// long as a cap is far off, a share near 0 is the easy way out, and a trap; so a training looks at
 /// the caps alone first, and then lets each trajectory have a share of its own where that is
 /// better.
 enum class ReturnStage { whole, either, actual };
+
+/// From this part of the steps on, of a training or a fit of codes, the law is judged as it is, for
+/// those that return the whole way, too: what is left of their share is worth more than the pull of
+/// `either` says.
+inline constexpr double kActualFrom = 0.9;
 
 /// What an objective evaluates: the fused ops. Plain tensor operations may take their place, to be
 /// compared with (uniphy/bench).
@@ -48,8 +56,7 @@ struct ObjectiveOps {
 class Objective {
  public:
   /// Shares the columns.
-  Objective(const LawColumns& columns, const ops::ErrorMeasure& measure,
-            const ObjectiveOps& ops = {});
+  Objective(const LawColumns& columns, const LossOptions& loss, const ObjectiveOps& ops = {});
 
   /// rows: [N, m] sample indices, row i of trajectory scale_rows[i]; z: [N, latent_size]. The law
   /// has the form of the columns.
@@ -67,6 +74,7 @@ class Objective {
 
   kernels::LawForm form_;
   ops::ErrorMeasure measure_;
+  bool squared_;
   ObjectiveOps ops_;
   torch::Tensor columns_;  ///< [S, columns]
   torch::Tensor scales_;   ///< [N, 4]: stress, strain, decrease, flow_time

@@ -20,10 +20,6 @@
 namespace uniphy {
 namespace {
 
-/// From this part of the steps on the law is judged as it is, for those that return the whole way,
-/// too: what is left of their share is worth more than the pull to 1 says.
-constexpr double kActualFrom = 0.9;
-
 using torch::Tensor;
 
 constexpr std::int64_t kReportEvery = 100;
@@ -66,7 +62,7 @@ TrainingResult train(const Dataset& data, const TrainingOptions& o,
                      const std::filesystem::path& checkpoint, const LawColumns* heldout) {
   const auto start = std::chrono::steady_clock::now();
   const LawColumns columns = law_columns(data, o.law.form);
-  const Objective objective(columns, o.loss.measure());
+  const Objective objective(columns, o.loss);
   const BatchSampler sampler(columns.first, o.seed);
   torch::Generator generator = torch::make_generator<at::CPUGeneratorImpl>(o.seed);
   TrainingResult result;

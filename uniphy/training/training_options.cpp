@@ -16,8 +16,8 @@ TrainingOptions read_training_options(Section& config, const TrainingOptions& de
                    {"gelu", "silu", "squareplus"}, "of the hidden layers"));
   law.latent_size = model.integer("latent_size", law.latent_size, between(1, 256), "",
                                   "numbers in a latent code");
-  if (law.form == kernels::LawForm::isotropic && law.latent_size < 2 && !config.describing()) {
-    model.fail("latent_size", "expected 2 or more: form isotropic takes its scales from two");
+  if (law.latent_size < 2 && !config.describing()) {
+    model.fail("latent_size", "expected 2 or more: the law takes its scales from two");
   }
   law.hidden_layers =
       model.integer("hidden_layers", law.hidden_layers, between(0, 16), "", "of each network");
@@ -45,7 +45,12 @@ TrainingOptions read_training_options(Section& config, const TrainingOptions& de
   options.weight_decay =
       t.real("weight_decay", options.weight_decay, between(0, 100), "", "of AdamW");
   read_loss_options(t, options.loss);
+  if (options.loss.squared && law.form == kernels::LawForm::isotropic && !config.describing()) {
+    t.fail("loss", "expected logarithm: form isotropic has no other loss");
+  }
   options.clip = t.real("clip", options.clip, Range{0, 1e6, true}, "", "largest gradient norm");
+  options.clip_each = t.boolean("clip_each", options.clip_each,
+                                "of each of the two networks, not of both together");
   options.caps_share =
       t.real("caps_share", options.caps_share, between(0, 1), "",
              "of the steps, the first ones: the projection is judged as if it returned the whole "
@@ -58,11 +63,11 @@ TrainingOptions read_training_options(Section& config, const TrainingOptions& de
 std::string TrainingOptions::text() const {
   return fmt::format(
       "{} {} caps {} moduli {} latent {} layers {} width {} seed {} steps {} batch {} rate {} x {} "
-      "decay {} sigma {} prior {} floor {} delta {} clip {} caps share {}",
+      "decay {} sigma {} prior {} floor {} delta {} clip {} {} caps share {} squared {}",
       kernels::form_name(law.form), kernels::activation_name(law.activation), law.state_caps,
       law.state_moduli, law.latent_size, law.hidden_layers, law.width, seed, steps,
       batch_per_trajectory, learning_rate, latent_rate, weight_decay, loss.latent_sigma,
-      loss.prior_weight, loss.error_floor, loss.delta, clip, caps_share);
+      loss.prior_weight, loss.error_floor, loss.delta, clip, clip_each, caps_share, loss.squared);
 }
 
 }  // namespace uniphy

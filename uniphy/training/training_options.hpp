@@ -19,6 +19,7 @@ struct TrainingOptions {
   double latent_rate = 10;                 ///< times learning_rate, for z
   double weight_decay = 1e-6;
   double clip = 1;          ///< largest norm of the networks' gradient
+  bool clip_each = false;   ///< of each of the two networks, not of both together
   double caps_share = 0.7;  ///< part of the steps that judge the caps alone, see ReturnStage
   LossOptions loss;
   std::int64_t checkpoint_every = 500;

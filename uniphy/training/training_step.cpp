@@ -25,7 +25,12 @@ TrainingStep training_step(const Objective& objective, const models::TrainedMode
   const Tensor prior = z.pow(2).sum(1).mean() / (o.loss.latent_sigma * o.loss.latent_sigma);
   step.loss = Objective::loss(step.errors, stage).mean() + prior * o.loss.prior_weight;
   step.loss.backward();
-  torch::nn::utils::clip_grad_norm_(model.law->parameters(), o.clip);
+  if (o.clip_each) {
+    for (const Tensor& network : model.law->parameters())
+      torch::nn::utils::clip_grad_norm_(network, o.clip);
+  } else {
+    torch::nn::utils::clip_grad_norm_(model.law->parameters(), o.clip);
+  }
   optimizer.step();
   return step;
 }

@@ -109,8 +109,8 @@ class LearnedLawKernel final : public LawKernel<T> {
       bias.assign(projection_width, T(0));
       at_rest(law_.projection, projection_outputs(accumulator).data(), bias.data(), nullptr);
       projection_.packed().add_latent_gradient(bias.data(), z);
-      if (latent_size_ > 1) z[1] += kStrainRate * double(tail[1]);
     }
+    if (latent_size_ > 1) z[1] += kStrainRate * double(tail[1]);
     if (latent_size_ > 0) z[0] += kStressRate * double(tail[0]);
     std::copy(z.begin(), z.end(), gradient);
   }
