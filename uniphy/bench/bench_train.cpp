@@ -63,9 +63,7 @@ struct Training {
     optimizer = std::make_unique<torch::optim::AdamW>(make_optimizer(model, options));
   }
 
-  Objective objective(const ObjectiveOps& ops = {}) const {
-    return {columns, options.loss, ops};
-  }
+  Objective objective(const ObjectiveOps& ops = {}) const { return {columns, options.loss, ops}; }
   void step(const Objective& objective) {
     training_step(objective, model, sampler.rows(0, batch), ReturnStage::actual, options,
                   *optimizer);

@@ -14,9 +14,11 @@
 #include "uniphy/io/seal.hpp"
 #include "uniphy/report/plot.hpp"
 #include "uniphy/training/heldout_fit.hpp"
+#include "uniphy/training/initial_model.hpp"
 #include "uniphy/training/objective.hpp"
 #include "uniphy/training/trainer.hpp"
 #include "uniphy/training/training_report.hpp"
+#include "uniphy/training/training_step.hpp"
 
 namespace uniphy {
 namespace {
@@ -54,7 +56,9 @@ TEST_F(TrainingTest, ObjectiveIsTheKernelsError) {
     torch::Generator generator = torch::make_generator<at::CPUGeneratorImpl>(5);
     const models::LearnedLaw law(small_options(form).law, generator);
     const Tensor z = torch::randn({4, 4}, generator, torch::kFloat32) * 0.3;
-    const Objective objective(law_columns(data, form), {1e-6, 1e-3});
+    LossOptions loss;
+    loss.error_floor = 1e-6;
+    const Objective objective(law_columns(data, form), loss);
     // Errors are means over the samples of a trajectory; here each sample is one of its own.
     const Tensor of = torch::arange(4).repeat_interleave(40);
     const LawErrors errors =
@@ -85,6 +89,58 @@ TEST_F(TrainingTest, ObjectiveIsTheKernelsError) {
             << kernels::form_name(form) << " trajectory " << i << " sample " << s;
       }
     }
+  }
+}
+
+/// With a floor that is far above every sample, a relative error is a squared error over the mean
+/// square of its trajectory, but for the floor.
+TEST_F(TrainingTest, SquaredLossesAreOverTheMeanSquareOfTheTrajectory) {
+  const LawColumns columns = law_columns(small_data(40, 3), kernels::LawForm::published);
+  torch::Generator generator = torch::make_generator<at::CPUGeneratorImpl>(5);
+  const models::LearnedLaw law(small_options(kernels::LawForm::published).law, generator);
+  const Tensor z = torch::randn({4, 4}, generator, torch::kFloat32) * 0.3;
+  LossOptions loss;
+  loss.squared = true;
+  loss.error_floor = 1e3;
+  const LawErrors e =
+      Objective(columns, loss).errors(law, z, torch::arange(160).view({4, 40}), torch::arange(4));
+  EXPECT_TRUE(torch::allclose(e.stress_loss, e.stress * 1e6, 1e-3));
+  EXPECT_TRUE(torch::allclose(e.projection_loss, e.projection * 1e6, 1e-3));
+  EXPECT_THROW(Objective(law_columns(small_data(2, 3), kernels::LawForm::isotropic), loss), Error);
+}
+
+TEST_F(TrainingTest, AShareThatIsNearlyWholeIsPulledTo1) {
+  const Tensor zero = torch::zeros({3});
+  const Tensor share = torch::tensor({1.0F, 0.99F, 0.2F}).requires_grad_();
+  const LawErrors e{zero, zero, zero, share, zero, zero, zero};
+  const Tensor loss = Objective::loss(e, ReturnStage::actual);
+  EXPECT_EQ(loss[0].item<float>(), 0);
+  EXPECT_NEAR(loss[1].item<float>(), 0.03 * std::log(2.0), 1e-6);
+  loss.slice(0, 1).sum().backward();
+  EXPECT_NEAR(share.grad()[1].item<float>(), -1.5, 1e-4);  // pulls
+  EXPECT_GT(share.grad()[2].item<float>(), -0.05);         // lets go
+}
+
+TEST_F(TrainingTest, EachNetworkIsClippedByItself) {
+  const LawColumns columns = law_columns(small_data(40, 3), kernels::LawForm::published);
+  TrainingOptions o = small_options(kernels::LawForm::published);
+  o.clip = 1e-3;
+  for (const bool each : {true, false}) {
+    o.clip_each = each;
+    torch::Generator generator = torch::make_generator<at::CPUGeneratorImpl>(5);
+    const models::TrainedModel model = initial_model(small_data(40, 3), columns, o.law, generator);
+    torch::optim::AdamW optimizer = make_optimizer(model, o);
+    training_step(Objective(columns, o.loss), model, torch::arange(160).view({4, 40}),
+                  ReturnStage::actual, o, optimizer);
+    double squares = 0;
+    for (const Tensor& network : model.law->parameters()) {
+      const double norm = network.grad().norm().item<double>();
+      if (each) {
+        EXPECT_NEAR(norm, o.clip, 1e-2 * o.clip);
+      }
+      squares += norm * norm;
+    }
+    EXPECT_NEAR(std::sqrt(squares), (each ? std::sqrt(2.0) : 1.0) * o.clip, 1e-2 * o.clip);
   }
 }
 
