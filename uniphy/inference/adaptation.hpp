@@ -46,7 +46,7 @@ struct Adaptation {
 ///    since the nearest code of the trained family may be of the wrong kind, and points at which
 ///    the two terms of the elastic stress are apart (split_terms). They are fitted over horizons
 ///    that grow as in the schedule, and half of them, those that forecast best up to the next one,
-///    go on.
+///    go on. All are pulled to where they began, less and less, until no more than the noise says.
 /// 4. The rung chosen is fitted to the whole observation, from where it is.
 ///
 /// Without a contact, with analytic variables, which have no rungs, and where `latent` is the only

@@ -26,7 +26,7 @@ class Stopwatch {
 };
 
 /// Share of the loss that an iteration has to take away.
-constexpr double kLittleGain = 0.05;
+constexpr double kLittleGain = 0.01;
 
 }  // namespace
 

@@ -22,7 +22,7 @@ struct Pull {
 };
 
 /// The point of a problem's first `frames` that at most `iterations` of LevenbergMarquardt lead to
-/// from `start`; it ends sooner where an iteration gains less than 5 % of the loss. Goes on where
+/// from `start`; it ends sooner where an iteration gains less than 1 % of the loss. Goes on where
 /// the task was left.
 torch::Tensor least_squares(const FitProblem& problem, const torch::Tensor& start, const Pull& pull,
                             std::ptrdiff_t frames, int iterations, RungTask& task,
