@@ -41,6 +41,14 @@ MlpWeights linear(int in, std::vector<double> bias) {
   return {{layer}};
 }
 
+LawDescription analytic(LawId id, double lambda, double mu = 0) {
+  LawDescription d;
+  d.id = id;
+  d.mu = mu;
+  d.lambda = lambda;
+  return d;
+}
+
 constexpr double kWholeWay = 0;  ///< η̃ of a law that returns to its cap at once
 constexpr double kStrainOverStress = kernels::kStrainScale / kernels::kStressScale;
 
@@ -128,10 +136,7 @@ TEST(LearnedLaw, WithAConstantCapIsPlasticine) {
   const double mu = 1e5, lambda = 2e5, tau_y = 7e3;
   const auto learned = kernels::make_law<double>(
       described(hencky_solid(mu, lambda, tau_y / (2 * mu) / kernels::kStrainScale, 1e6), {0, 0}));
-  LawDescription d;
-  d.id = LawId::plasticine;
-  d.mu = mu;
-  d.lambda = lambda;
+  LawDescription d = analytic(LawId::plasticine, lambda, mu);
   d.tau_y = tau_y;
   const Largest largest = difference(*learned, *kernels::make_law<double>(d));
   EXPECT_LE(largest.projection, 2e-15);
@@ -144,10 +149,7 @@ TEST(LearnedLaw, WithACapLinearInTheTraceIsSand) {
   const double slope = -alpha * (3 * lambda + 2 * mu) / (2 * mu);
   const auto learned =
       kernels::make_law<double>(described(hencky_solid(mu, lambda, 0, 0, slope), {0, 0}));
-  LawDescription d;
-  d.id = LawId::sand;
-  d.mu = mu;
-  d.lambda = lambda;
+  LawDescription d = analytic(LawId::sand, lambda, mu);
   d.theta = theta;
   const Largest largest = difference(*learned, *kernels::make_law<double>(d));
   EXPECT_LE(largest.projection, 2e-15);
@@ -160,10 +162,7 @@ TEST(LearnedLaw, WithACapAndARateIsNonNewtonian) {
   const auto learned = kernels::make_law<double>(described(
       hencky_solid(mu, lambda, cap, 1e6, 0, std::asinh(eta / (2 * mu * kernels::kFlowStep))),
       {0, 0}));
-  LawDescription d;
-  d.id = LawId::non_newtonian;
-  d.mu = mu;
-  d.lambda = lambda;
+  LawDescription d = analytic(LawId::non_newtonian, lambda, mu);
   d.tau_y = tau_y;
   d.eta = eta;
   const Largest largest = difference(*learned, *kernels::make_law<double>(d));
@@ -175,10 +174,7 @@ TEST(LearnedLaw, WithGreensMeasureIsNeoHookean) {
   const double mu = 1e5, lambda = 2e5;
   auto weights = hencky_solid(mu, lambda, 1e6, 1e6);
   weights.stress.layers[0].bias[kernels::kShearExponent] = 2;
-  LawDescription d;
-  d.id = LawId::elastic;
-  d.mu = mu;
-  d.lambda = lambda;
+  const LawDescription d = analytic(LawId::elastic, lambda, mu);
   const Largest largest = difference(*kernels::make_law<double>(described(weights, {0, 0})),
                                      *kernels::make_law<double>(d));
   EXPECT_EQ(largest.projection, 0);
@@ -192,10 +188,7 @@ TEST(LearnedLaw, WithTheLiquidsExponentsIsNewtonian) {
   outputs[kernels::kViscosity] = std::asinh(mu / (kernels::kStressScale * kernels::kTimeScale));
   outputs[kernels::kVolumeGamma] = 3.5;
   outputs[kernels::kVolumeDelta] = -2.5;
-  LawDescription d;
-  d.id = LawId::newtonian;
-  d.mu = mu;
-  d.lambda = lambda;
+  const LawDescription d = analytic(LawId::newtonian, lambda, mu);
   const Largest largest = difference(*kernels::make_law<double>(described(weights, {0, 0})),
                                      *kernels::make_law<double>(d));
   EXPECT_LE(largest.projection, 6e-15);
@@ -208,10 +201,7 @@ TEST(LearnedLaw, ACodeServesAnyTimeStep) {
   const auto learned = kernels::make_law<double>(described(
       hencky_solid(mu, lambda, cap, 1e6, 0, std::asinh(eta / (2 * mu * kernels::kFlowStep))),
       {0, 0}));
-  LawDescription d;
-  d.id = LawId::non_newtonian;
-  d.mu = mu;
-  d.lambda = lambda;
+  LawDescription d = analytic(LawId::non_newtonian, lambda, mu);
   d.tau_y = tau_y;
   d.eta = eta;
   for (const double dt : {1e-5, 2e-4, 1e-3}) {
@@ -231,10 +221,7 @@ TEST(LearnedLaw, WithTwoMeasuresIsFixedCorotated) {
   outputs[kernels::kShearExponent] = 2;
   outputs[kernels::kSecondShear] = std::asinh(-2 * mu * kStrainOverStress);
   outputs[kernels::kSecondExponent] = 1;
-  LawDescription d;
-  d.id = LawId::fixed_corotated;
-  d.mu = mu;
-  d.lambda = lambda;
+  const LawDescription d = analytic(LawId::fixed_corotated, lambda, mu);
   const Largest largest = difference(*kernels::make_law<double>(described(weights, {0, 0})),
                                      *kernels::make_law<double>(d));
   EXPECT_EQ(largest.projection, 0);
@@ -251,9 +238,7 @@ TEST(LearnedLaw, WithTwoIsochoricMeasuresIsMooneyRivlin) {
   outputs[kernels::kSecondShear] = std::asinh(4 * c2 * kStrainOverStress);
   outputs[kernels::kSecondExponent] = -2;
   outputs[kernels::kIsochoricShare] = 1;
-  LawDescription d;
-  d.id = LawId::mooney_rivlin;
-  d.lambda = lambda;
+  LawDescription d = analytic(LawId::mooney_rivlin, lambda);
   d.c1 = c1;
   d.c2 = c2;
   const Largest largest = difference(*kernels::make_law<double>(described(weights, {0, 0})),
@@ -274,9 +259,7 @@ TEST(LearnedLaw, WithARateIsCarreau) {
   outputs[kernels::kRateViscosity] = viscosity(eta - eta_inf);
   outputs[kernels::kRateScale] = std::log(std::sqrt(2) * kappa / kernels::kTimeScale);
   outputs[kernels::kRateExponent] = (n - 1) / 2;
-  LawDescription d;
-  d.id = LawId::carreau;
-  d.lambda = lambda;
+  LawDescription d = analytic(LawId::carreau, lambda);
   d.eta = eta;
   d.eta_inf = eta_inf;
   d.kappa = kappa;
@@ -300,10 +283,7 @@ TEST(LearnedLaw, WithAPowerOfTheExcessIsHerschelBulkley) {
     auto weights = hencky_solid(mu, lambda, tau_y / (2 * mu) / e, 1e6, 0, std::asinh(v));
     weights.projection.layers[0].bias[kernels::kFlowExponent] =
         kernels::kFlowPowerLimit * std::atanh(std::log(p) / kernels::kFlowPowerLimit);
-    LawDescription d;
-    d.id = LawId::herschel_bulkley;
-    d.mu = mu;
-    d.lambda = lambda;
+    LawDescription d = analytic(LawId::herschel_bulkley, lambda, mu);
     d.tau_y = tau_y;
     d.eta = eta;
     d.n = n;

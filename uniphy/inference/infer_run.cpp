@@ -72,11 +72,12 @@ Inference infer(const Observation& observation, const std::string& name,
 }
 
 bool explains(const Inference& inference) {
-  double most = inference.misfit.over_size;
+  const double allowed = inference.misfit.allowed;
+  bool explains = inference.misfit.over_size <= allowed;
   for (const RungReport& r : inference.rungs) {
-    if (r.rung == inference.rung) most = std::max(most, r.kept);
+    if (r.rung == inference.rung) explains = explains && r.kept <= kForecastAllowance * allowed;
   }
-  return most <= inference.misfit.allowed;
+  return explains;
 }
 
 ModelFile adapted_model(const Inference& inference, const Observation& observation,

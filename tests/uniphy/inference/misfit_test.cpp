@@ -53,5 +53,22 @@ TEST(Misfit, SaysHowFarWhenAndWhere) {
   EXPECT_EQ(misfit_chart(m).series.size(), 3u);
 }
 
+TEST(Misfit, AForecastMayMissFiveTimesAsMuchAsAFit) {
+  Inference found;
+  found.misfit.allowed = 1e-3;
+  found.misfit.over_size = 0.9e-3;
+  EXPECT_TRUE(explains(found));
+  found.rungs.resize(2);
+  found.rungs[0].kept = 1;  // of a rung that was not chosen
+  found.rungs[1].rung = found.rung = Rung::numbers;
+  found.rungs[1].kept = 4.9e-3;
+  EXPECT_TRUE(explains(found));
+  found.rungs[1].kept = 5.1e-3;
+  EXPECT_FALSE(explains(found));
+  found.rungs[1].kept = 0;
+  found.misfit.over_size = 1.1e-3;
+  EXPECT_FALSE(explains(found));
+}
+
 }  // namespace
 }  // namespace uniphy
