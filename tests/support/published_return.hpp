@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "ops/kernels/learned/learned_law_weights.hpp"
+#include "ops/kernels/learned/published_scales.hpp"
 
 namespace uniphy::testing {
 
@@ -20,10 +21,8 @@ inline kernels::LearnedLawWeights published_return(double part, int latent_size)
   weights.projection.layers = {layer(shape.projection_in)};
   weights.stress.layers = {layer(shape.stress_in)};
   kernels::MlpWeights::Layer& projection = weights.projection.layers[0];
-  for (int k = 0; k < 9; ++k) {  // F comes first
-    projection.weight[std::size_t(k) * projection.in + k] = -part;
-    projection.bias[k] = k % 4 == 0 ? part : 0;
-  }
+  for (int k = 0; k < 9; ++k)  // F − I comes first
+    projection.weight[std::size_t(k) * projection.in + k] = -part / kernels::kDeltaOverStrain;
   return weights;
 }
 
