@@ -116,12 +116,16 @@ INSTANTIATE_TEST_SUITE_P(
                   "variants:\n  - {name: a, training: {steps: 5}}\n",
                   "c.yaml:2: variants.0.training.steps: unknown key; known keys here: seed, "
                   "batch_per_trajectory, learning_rate, latent_rate, weight_decay, latent_sigma, "
-                  "prior_weight, error_floor, delta, clip, caps_share, checkpoint_every"},
-        BadConfig{
-            "OneLatentNumber", ablation_stage,
-            "variants:\n  - {name: a, model: {latent_size: 1}}\n",
-            "c.yaml:2: variants.0.model.latent_size: expected 2 or more: form isotropic takes "
-            "its scales from two"},
+                  "prior_weight, error_floor, loss, delta, clip, clip_each, caps_share, "
+                  "checkpoint_every"},
+        BadConfig{"SquaresOfTheIsotropicForm", ablation_stage,
+                  "variants:\n  - {name: a, training: {loss: squared}}\n",
+                  "c.yaml:2: variants.0.training.loss: expected logarithm: form isotropic has no "
+                  "other loss"},
+        BadConfig{"OneLatentNumber", ablation_stage,
+                  "variants:\n  - {name: a, model: {latent_size: 1}}\n",
+                  "c.yaml:2: variants.0.model.latent_size: expected 2 or more: the law takes its "
+                  "scales from two"},
         BadConfig{"UnknownForm", ablation_stage, "variants:\n  - {name: a, model: {form: cubic}}\n",
                   "c.yaml:2: variants.0.model.form: expected one of isotropic, published, found "
                   "\"cubic\""},
