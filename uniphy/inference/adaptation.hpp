@@ -18,7 +18,7 @@ struct AdaptationOptions {
   double enough = 3e-4;  ///< root of the mean square error over size that asks for no more
   double pull = 1e-8;    ///< weight of ‖W − W₀‖² on the last rung, against mse/size²
   /// Root of the mean square error over size, beside the noise, of a motion that counts as
-  /// explained. A choice, not measured over materials yet; so are `gain`, `enough` and `pull`.
+  /// explained. A choice, tried on the benchmark cube alone; so are `gain`, `enough` and `pull`.
   double tolerance = 1e-3;
   int iterations = 12;              ///< of LevenbergMarquardt, at most
   int epochs = 60;                  ///< roll-outs with gradients of all weights
