@@ -8,13 +8,13 @@
 #include <torch/torch.h>
 
 #include <cmath>
-#include <functional>
 #include <string>
 
 #include "models/script_check.hpp"
 #include "models/trained_model.hpp"
 #include "ops/kernels/base/error.hpp"
 #include "ops/reference/learned_law.hpp"
+#include "tests/support/error_of.hpp"
 
 namespace uniphy::models {
 namespace {
@@ -23,15 +23,6 @@ using kernels::Activation;
 using kernels::LawForm;
 using ::testing::HasSubstr;
 using torch::Tensor;
-
-std::string message_of(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const Error& e) {
-    return e.what();
-  }
-  return "no error";
-}
 
 double relative(const Tensor& a, const Tensor& b) {
   return (a - b).norm().item<double>() / b.norm().item<double>();
@@ -220,20 +211,21 @@ TEST_P(LearnedLawModule, RefusesWhatDoesNotFit) {
   const LearnedLaw law = wide_law(options(GetParam()));
   const Tensor F = torch::eye(3, torch::kFloat64).repeat({2, 1, 1});
   const Tensor z = torch::zeros(5, torch::kFloat64);
-  EXPECT_THAT(message_of([&] { law->project(F[0], z); }), HasSubstr("learned law: F: expected"));
-  EXPECT_THAT(message_of([&] { law->project(F, torch::zeros(5)); }),
+  EXPECT_THAT(testing::error_of([&] { law->project(F[0], z); }),
+              HasSubstr("learned law: F: expected"));
+  EXPECT_THAT(testing::error_of([&] { law->project(F, torch::zeros(5)); }),
               HasSubstr("learned law: z: expected"));
-  EXPECT_THAT(message_of([&] { law->stress(F, F.slice(0, 1), z); }),
+  EXPECT_THAT(testing::error_of([&] { law->stress(F, F.slice(0, 1), z); }),
               HasSubstr("learned law: C: expected"));
   LearnedLawOptions o = options(GetParam());
   o.width = 0;
-  EXPECT_EQ(message_of([&] { random_law(o); }),
+  EXPECT_EQ(testing::error_of([&] { random_law(o); }),
             "learned law: width: expected 1 or more units, found 0");
   o.hidden_layers = -2;
-  EXPECT_EQ(message_of([&] { random_law(o); }),
+  EXPECT_EQ(testing::error_of([&] { random_law(o); }),
             "learned law: hidden_layers: expected 0 or more, found -2");
   o.latent_size = -1;
-  EXPECT_EQ(message_of([&] { random_law(o); }),
+  EXPECT_EQ(testing::error_of([&] { random_law(o); }),
             "learned law: latent_size: expected 0 or more numbers, found -1");
 }
 
@@ -267,12 +259,12 @@ TEST(TrainedModel, GoesThroughAModelFile) {
 }
 
 TEST(LatentCodes, RefuseTablesOfDifferentLength) {
-  EXPECT_EQ(message_of([] {
+  EXPECT_EQ(testing::error_of([] {
               LatentCodes codes(torch::zeros({2, 4}), std::vector<std::string>{"sand", "elastic"},
                                 std::vector<MaterialParameters>{no_parameters()});
             }),
             "latent codes: parameters: expected 2 rows, one for each code, found 1");
-  EXPECT_EQ(message_of([] {
+  EXPECT_EQ(testing::error_of([] {
               LatentCodes codes(torch::zeros({1, 4}), std::vector<std::string>{},
                                 std::vector<MaterialParameters>{no_parameters()});
             }),
@@ -282,7 +274,8 @@ TEST(LatentCodes, RefuseTablesOfDifferentLength) {
   file.materials = {"sand"};
   file.parameters = {no_parameters()};
   file.latents = {1, 2};
-  EXPECT_EQ(message_of([&] { LatentCodes{file}; }), "latent codes: expected 3 numbers, found 2");
+  EXPECT_EQ(testing::error_of([&] { LatentCodes{file}; }),
+            "latent codes: expected 3 numbers, found 2");
 }
 
 }  // namespace

@@ -6,7 +6,7 @@
 #include "ops/kernels/spectral/spectral.hpp"
 
 // The published form of the learned law, as published (UniPhy, supplementary, Algorithms 1 and 2):
-//   projection  Δ = e_Δ g_φ((F, U, Σ, Vᵀ) − at rest)/e, z),  F_proj = F + Δ
+//   projection  Δ = e_Δ g_φ(((F, U, Σ, Vᵀ) − at rest)/e, z),  F_proj = F + Δ
 //   stress      S₁ = f_θ(((Σ, FᵀF, J, log J, F_max, log F_max) − at rest)/e, RᵀCR t₀, z) of the
 //               projected F,  F_max = max(F₀₀, 1e-6),  R = U Vᵀ,  τ = s R ½(S₁ + S₁ᵀ) Rᵀ
 // with J clamped at 1e-6 in the logarithm; at rest F = U = V = I. It is kept as the reference: the
@@ -214,7 +214,7 @@ inline void published_adjoint(const LearnedLaw<T>& law, std::ptrdiff_t count, Vi
   const V scale(law.stress_scale), zero(T(0)), one(T(1)), floor(T(1e-6)), t0 = V(T(kTimeScale));
   const V inv_e(T(1) / law.strain_scale), delta_scale(T(kDeltaOverStrain) * law.strain_scale);
   V sum_log_s = zero, sum_log_e = zero;
-  // What the features of a network, the first `count` of which are in units of e, give to log e.
+  // What the features of a network, `features_in_e` of which are in units of e, give to log e.
   const auto of_features = [&](const T* features, int features_in_e, std::ptrdiff_t l) {
     V sum = zero;
     for (int k = 0; k < features_in_e; ++k)
