@@ -11,9 +11,12 @@ int main(int argc, char** argv) {
       "the analytic ones.\nkind: outside fits a trained law to the first half of motions by laws "
       "that "
       "it was not built around, and judges its forecast of the second half beside that of every "
-      "wrong analytic law. It goes on where it was interrupted.",
+      "wrong analytic law.\nkind: open_world fits it to what a laboratory sees of motions by the "
+      "five families (noise, tracked points, a truth from a finer grid) and judges the forecast by "
+      "where all particles are. The last two go on where they were interrupted.",
       {"trajectory: two trajectories (trajectory.h5)", "heldout:    a trained model (model.h5)",
-       "outside:    a trained model (model.h5); observations (observation.h5) if asked for"},
+       "outside:    a trained model (model.h5); observations (observation.h5) if asked for",
+       "open_world: a trained model (model.h5)"},
       {"trajectory:",
        "DIR/curve.csv       mean squared error of every frame",
        "DIR/curve.png       its root over the size of the object",
@@ -33,11 +36,17 @@ int main(int argc, char** argv) {
        "                    best_analytic.LAW: medians over scenes; the same of every scene with",
        "                    .SCENE after LAW; fits, motions_failed",
        "DIR/outside.md, outside.csv, forecast.png",
-       "DIR/fits            finished fits, which a later run of the same folder reads"},
+       "DIR/fits            finished fits, which a later run of the same folder reads",
+       "open_world:",
+       "DIR/metrics.json    forecast.CASE.M, floor.CASE.M (root over size), fit.CASE.M,",
+       "                    explained.CASE.M, named_right.CASE.M, fit_s.CASE.M,",
+       "                    fit_rollouts.CASE.M of every material M: medians over scenes; fits",
+       "DIR/open_world.md, open_world.csv, DIR/fits"},
       {"uniphy_evaluate configs/evaluate/trajectory.yaml --set trajectory=out/resim/trajectory.h5 "
        "--set reference=out/truth/trajectory.h5",
        "uniphy_evaluate configs/evaluate/heldout.yaml --set seed=7",
-       "uniphy_evaluate configs/evaluate/outside.yaml --set quick=true"}};
+       "uniphy_evaluate configs/evaluate/outside.yaml --set quick=true",
+       "uniphy_evaluate configs/evaluate/open_world.yaml --set cases=[noise]"}};
   return uniphy::run_experiment(
       argc, argv, info, [](uniphy::Section& config) { return uniphy::evaluate_stage(config); });
 }

@@ -22,7 +22,7 @@ std::string write_adapted(const uniphy::Inference& result, const uniphy::Observa
   return model.string();
 }
 
-void run(const std::filesystem::path& file, const uniphy::FitVariablesSource& source,
+void run(const uniphy::ObservationSource& observed, const uniphy::FitVariablesSource& source,
          const uniphy::FitOptions& options, const uniphy::AdaptationOptions& adaptation,
          uniphy::RunDirectory& out, uniphy::Metrics& metrics) {
   using namespace uniphy;
@@ -32,7 +32,9 @@ void run(const std::filesystem::path& file, const uniphy::FitVariablesSource& so
                 ": law.model: expected a file that this run does not write, "
                 "found the model.h5 of its own folder");
   }
-  const Observation observation = read_observation(file);
+  const std::filesystem::path& file = observed.file;
+  std::vector<std::string> warnings;
+  const Observation observation = observed.load(warnings);
   const auto variables = source.load();
   FitHooks hooks;
   hooks.state_file = out.file("state.h5");
@@ -47,7 +49,7 @@ void run(const std::filesystem::path& file, const uniphy::FitVariablesSource& so
   plot_chart(out.file("loss.png"), loss_chart(result.fit, *variables, "Inference"));
   write_misfit(out.file("residual.csv"), result.misfit);
   plot_chart(out.file("residual.png"), misfit_chart(result.misfit));
-  const Trajectory seen = observed_trajectory(observation);
+  const Trajectory seen = observed_trajectory(result.seen);
   plot_particles(out.file("frames.png"),
                  frames_picture({{"observed", &seen}, {"fitted", &result.fitted}}, 5));
   add_metrics(metrics, result, observation, *variables);
@@ -60,8 +62,11 @@ void run(const std::filesystem::path& file, const uniphy::FitVariablesSource& so
               result.fit.history.size());
   std::fputs(rung_table(result.rung, result.rungs).c_str(), stdout);
   std::fputs(fit_summary(result.fit, *variables).c_str(), stdout);
+  if (result.fit.determined) std::fputs(reading_text(result.reading).c_str(), stdout);
   std::fflush(stdout);
-  for (const std::string& warning : fit_warnings(result, observation, *variables)) {
+  for (const std::string& warning : fit_warnings(result, observation, *variables))
+    warnings.push_back(warning);
+  for (const std::string& warning : warnings) {
     std::fprintf(stderr, "warning: %s: %s\n", file.c_str(), warning.c_str());
   }
 }
@@ -76,8 +81,11 @@ int main(int argc, char** argv) {
       "the "
       "motion asks for. An interrupted run goes on where it was.",
       {"CONFIG.yaml         the observation, what is fitted, the schedule",
-       "observation.h5      positions, times and the scene, nothing about the material (layout: "
-       "uniphy/io/observation.hpp; uniphy_simulate writes one with output.observation=true)",
+       "observation.h5      positions of particles or of tracked points and the body, times and "
+       "the "
+       "scene, nothing about the material (layout: uniphy/io/observation.hpp; uniphy_simulate "
+       "writes one with output.observation=true, uniphy_observe makes of it what a laboratory "
+       "sees)",
        "model.h5            a trained model (layout: uniphy/io/model_file.hpp)"},
       {"DIR/latent.h5       the fitted material (layout: uniphy/io/latent_file.hpp)",
        "DIR/model.h5        the adapted law that latent.h5 belongs to, where z alone did not do",
@@ -94,13 +102,12 @@ int main(int argc, char** argv) {
        "uniphy_infer configs/infer/elastic.yaml"}};
   return uniphy::run_experiment(
       argc, argv, info, [](uniphy::Section& config) -> uniphy::RunFunction {
-        const std::filesystem::path file = config.input_file("observation", uniphy::required,
-                                                             "observed positions (observation.h5)");
+        const uniphy::ObservationSource observed = uniphy::read_observation_source(config);
         const uniphy::FitVariablesSource source = uniphy::read_fit_variables(config);
         const uniphy::FitOptions options = uniphy::read_fit_options(config);
         const uniphy::AdaptationOptions adaptation = uniphy::read_adaptation_options(config);
         return [=](uniphy::RunDirectory& out, uniphy::Metrics& metrics) {
-          run(file, source, options, adaptation, out, metrics);
+          run(observed, source, options, adaptation, out, metrics);
         };
       });
 }

@@ -8,6 +8,7 @@
 #include "ops/base/tensor_check.hpp"
 #include "ops/kernels/base/error.hpp"
 #include "ops/kernels/laws/law_parameters.hpp"
+#include "ops/kernels/laws/tracer.hpp"
 
 namespace uniphy::ops {
 
@@ -49,6 +50,7 @@ std::vector<T> to_vector(const Tensor& t) {
 Tensor pack_parameters(const std::vector<RolloutBody>& bodies) {
   variable_list all;
   for (std::size_t b = 0; b < bodies.size(); ++b) {
+    if (bodies[b].tracers) continue;
     const std::string name = "parameters of body " + std::to_string(b);
     const std::int64_t count = kernels::parameter_count(bodies[b].law);
     Tensor values = bodies[b].parameters;
@@ -58,7 +60,7 @@ Tensor pack_parameters(const std::vector<RolloutBody>& bodies) {
     const auto type = real_type("rollout", name.c_str(), values);
     all.push_back(checked("rollout", name.c_str(), values, type, {count}).to(torch::kFloat64));
   }
-  if (all.empty()) throw Error("rollout: bodies: expected at least one, found none");
+  if (all.empty()) throw Error("rollout: bodies: expected at least one of material, found none");
   return torch::cat(all);
 }
 
@@ -95,6 +97,10 @@ kernels::Rollout<T> make_rollout(const Plan& plan, const Tensor& parameters, con
   const double* values = parameters.data_ptr<double>();
   std::vector<kernels::BodyRange<T>> ranges;
   for (const RolloutBody& body : plan.bodies) {
+    if (body.tracers) {
+      ranges.push_back({body.begin, body.end, std::make_shared<const kernels::Tracer<T>>()});
+      continue;
+    }
     ranges.push_back(
         {body.begin, body.end, kernels::make_law<T>(kernels::with_parameters(body.law, values))});
     values += kernels::parameter_count(body.law);
@@ -194,10 +200,19 @@ RolloutFrames rollout(const Tensor& x0, const Tensor& v0, const Tensor& C0, cons
     throw Error("rollout: bodies: expected the last one to end at particle " + std::to_string(P) +
                 ", found " + std::to_string(end));
   }
+  for (std::size_t b = 1; b < bodies.size(); ++b) {
+    if (bodies[b].tracers || !bodies[b - 1].tracers) continue;
+    throw Error("rollout: bodies: expected tracers after all material, found material in body " +
+                std::to_string(b));
+  }
   auto plan = c10::make_intrusive<Plan>();
   plan->bodies = bodies;
   for (RolloutBody& body : plan->bodies) {
     BodyWeights& wanted = plan->weights.emplace_back();
+    if (body.tracers) {
+      body.networks = {};
+      body.law = {};
+    }
     if (!body.networks.defined()) continue;
     const std::string op = "rollout: body " + std::to_string(plan->weights.size() - 1);
     check_networks(op.c_str(), body.networks);

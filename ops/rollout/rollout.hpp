@@ -20,6 +20,9 @@ struct RolloutBody {
   /// The networks of a learned law, by whose numbers the roll-out is differentiated too; they take
   /// the place of law.id and law.weights. Bodies may share them.
   LearnedNetworks networks = {};
+  /// Not material but tracers (kernels::Tracer), with mass and volume 0: law, parameters and
+  /// networks are not looked at. No material may come after them.
+  bool tracers = false;
 };
 
 struct RolloutSettings {

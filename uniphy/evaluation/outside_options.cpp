@@ -120,6 +120,17 @@ std::vector<OutsideTruth> default_outside_laws(bool quick) {
   return laws;
 }
 
+void read_outside_scenes(Section& config, OutsideOptions& o) {
+  Section s = config.section("scene", "the benchmark cube of the field and drawn objects");
+  o.steps = s.integer("steps", o.quick ? 400 : 1000, between(20, 1000000), "",
+                      "the first half is fitted, the second one forecast");
+  o.dt = s.real("dt", 5e-4, between(1e-6, 1e-2), "s", "time step");
+  o.objects = s.integer("objects", o.quick ? 0 : 4, between(0, 1000), "",
+                        "drawn from the seed, of shapes that training never saw");
+  o.particles = s.integer("particles", 500, between(27, 100000), "", "about, of a drawn object");
+  o.per_side = s.integer("per_side", 10, between(3, 100), "", "particles along a side of the cube");
+}
+
 OutsideOptions read_outside_options(Section& config) {
   OutsideOptions o;
   o.quick = config.boolean("quick", false,
@@ -132,14 +143,7 @@ OutsideOptions read_outside_options(Section& config) {
   read_observations(config, names, o);
   if (o.laws.empty() && o.observations.empty()) o.laws = default_outside_laws(o.quick);
 
-  Section s = config.section("scene", "the benchmark cube of the field and drawn objects");
-  o.steps = s.integer("steps", o.quick ? 400 : 1000, between(20, 1000000), "",
-                      "the first half is fitted, the second one forecast");
-  o.dt = s.real("dt", 5e-4, between(1e-6, 1e-2), "s", "time step");
-  o.objects = s.integer("objects", o.quick ? 0 : 4, between(0, 1000), "",
-                        "drawn from the seed, of shapes that training never saw");
-  o.particles = s.integer("particles", 500, between(27, 100000), "", "about, of a drawn object");
-  o.per_side = s.integer("per_side", 10, between(3, 100), "", "particles along a side of the cube");
+  read_outside_scenes(config, o);
 
   Section a = config.section("analytic", "the wrong laws of the five families");
   o.analytic = a.boolean("fit", !o.quick, "fits every one of them to the same motions");

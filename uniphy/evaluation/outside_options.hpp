@@ -44,6 +44,9 @@ struct OutsideOptions {
 
 OutsideOptions read_outside_options(Section& config);
 
+/// Declares and reads the section `scene`; `quick` is known already.
+void read_outside_scenes(Section& config, OutsideOptions& options);
+
 /// The laws that a configuration without `laws` has: those of `quick` alone, or all.
 std::vector<OutsideTruth> default_outside_laws(bool quick);
 

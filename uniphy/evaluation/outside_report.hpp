@@ -12,7 +12,7 @@ namespace uniphy {
 struct OutsideCell {
   std::string law, scene, fitted;
   Forecast result;
-  std::string named;   ///< learned: material of the nearest code; empty where it is not determined
+  std::string named;   ///< learned: what it behaves like; empty where it is not determined
   double seconds = 0;  ///< of the run that made it
 };
 
@@ -26,7 +26,7 @@ struct OutsideRow {
   double rung = 0, explained = 0;           ///< medians
   double best_analytic = 0;  ///< median of the best forecast of a wrong family, or NaN
   std::string analytic;      ///< that family, in the most scenes
-  std::string named;         ///< nearest code, in the most scenes
+  std::string named;         ///< what it behaves like, in the most scenes
 };
 
 /// The rows in the order of the cells.

@@ -13,9 +13,9 @@
 
 #include "ops/kernels/base/error.hpp"
 #include "uniphy/data/material_ranges.hpp"
+#include "uniphy/evaluation/finished_fits.hpp"
 #include "uniphy/evaluation/outside_report.hpp"
 #include "uniphy/evaluation/outside_scenes.hpp"
-#include "uniphy/inference/adaptation_state.hpp"
 #include "uniphy/io/atomic_file.hpp"
 
 namespace uniphy {
@@ -68,116 +68,30 @@ std::vector<Motion> motions(const OutsideOptions& o) {
   return all;
 }
 
-/// The lines of one section of a resolved configuration.
-std::string section_text(const std::string& yaml, const std::string& key) {
-  const std::size_t begin = yaml.find("\n" + key + ":");
-  if (begin == std::string::npos) return {};
-  std::size_t end = yaml.find('\n', begin + 1);
-  while (end != std::string::npos && end + 1 < yaml.size() && yaml[end + 1] == ' ')
-    end = yaml.find('\n', end + 1);
-  return yaml.substr(begin + 1, end - begin - 1);
-}
-
-/// Finished fits on disk.
-class FitStore {
- public:
-  explicit FitStore(const RunDirectory& out)
-      : folder_(out.file("fits")),
-        settings_(section_text(out.config_yaml(), "fit") +
-                  section_text(out.config_yaml(), "adaptation")) {
-    make_directory(folder_);
-  }
-
-  /// Where the fit is kept, without an ending.
-  std::filesystem::path stem(const OutsideCell& cell, const Observation& seen,
-                             const FitVariables& variables) const {
-    return folder_ / fmt::format("{}.{}.{}-{}", cell.law, cell.scene, cell.fitted,
-                                 fit_fingerprint(seen, variables, settings_));
-  }
-
-  static void write(const std::filesystem::path& stem, const OutsideCell& cell) {
-    Metrics m;
-    m.set("fit", cell.result.fit);
-    m.set("forecast", cell.result.forecast);
-    m.set("rung", cell.result.rung);
-    m.set("explained", cell.result.explained ? 1 : 0);
-    m.set("nearest", cell.result.nearest);
-    m.set("roll_outs", cell.result.roll_outs);
-    m.set("seconds", cell.seconds);
-    m.write(file(stem));
-  }
-
-  static bool read(const std::filesystem::path& stem, OutsideCell& cell) {
-    if (!std::filesystem::exists(file(stem))) return false;
-    const Metrics m = Metrics::read(file(stem));
-    const auto number = [&](const char* name) {
-      const auto value = m.find(name);
-      if (!value) throw Error(fmt::format("{}: {}: missing", file(stem).string(), name));
-      return std::isnan(*value) ? kInfinity : *value;  // JSON has no infinity
-    };
-    cell.result.fit = number("fit");
-    cell.result.forecast = number("forecast");
-    cell.result.rung = static_cast<int>(number("rung"));
-    cell.result.explained = number("explained") != 0;
-    cell.result.nearest = static_cast<int>(number("nearest"));
-    cell.result.roll_outs = number("roll_outs");
-    cell.seconds = number("seconds");
-    return true;
-  }
-
- private:
-  static std::filesystem::path file(std::filesystem::path stem) { return stem += ".json"; }
-
-  std::filesystem::path folder_;
-  std::string settings_;
-};
-
-/// Fits, or says why that failed.
-Forecast forecast_or_failure(const OutsideCell& cell, const Observation& seen,
-                             const FitVariables& variables, const OutsideOptions& o,
-                             const FitHooks& hooks) {
-  const std::string name = fmt::format("{} in {}", cell.law, cell.scene);
-  try {
-    return forecast(seen, name, variables, o.fit, o.adaptation, hooks);
-  } catch (const Error& error) {
-    std::fprintf(stderr, "warning: %s fitted by %s: %s\n", name.c_str(), cell.fitted.c_str(),
-                 error.what());
-    Forecast failed;
-    failed.fit = failed.forecast = kInfinity;
-    failed.explained = false;
-    return failed;
-  }
-}
-
 OutsideCell make_cell(const Motion& motion, const Contender& by, const Observation& seen,
-                      const OutsideOptions& o, const FitStore& store) {
+                      const OutsideOptions& o, const FinishedFits& finished) {
   OutsideCell cell;
   cell.law = motion.law;
   cell.scene = motion.scene;
   cell.fitted = by.name;
-  const std::filesystem::path stem = store.stem(cell, seen, *by.variables);
-  if (!FitStore::read(stem, cell)) {
+  const std::filesystem::path stem = finished.stem(
+      fmt::format("{}.{}.{}", cell.law, cell.scene, cell.fitted), seen, *by.variables);
+  if (!FinishedFits::read(stem, cell.result, cell.seconds)) {
     const auto start = std::chrono::steady_clock::now();
-    FitHooks hooks;
-    hooks.state_file = stem;
-    hooks.state_file += ".state.h5";
-    hooks.fingerprint = stem.filename().string();
-    cell.result = forecast_or_failure(cell, seen, *by.variables, o, hooks);
+    const FitHooks hooks = FinishedFits::hooks(stem);
+    cell.result = forecast_or_failure({seen, fmt::format("{} in {}", cell.law, cell.scene)},
+                                      by.name, *by.variables, o.fit, o.adaptation, hooks);
     cell.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    FitStore::write(stem, cell);
-    std::error_code ignored;
-    std::filesystem::remove(hooks.state_file, ignored);
-    std::filesystem::remove(adaptation_state_file(hooks.state_file), ignored);
+    FinishedFits::write(stem, cell.result, cell.seconds);
   }
-  if (by.name == kLearnedLaw && cell.result.nearest >= 0)
-    cell.named = by.variables->label(cell.result.nearest);
+  if (by.name == kLearnedLaw) cell.named = cell.result.material;
   return cell;
 }
 
 void run(const OutsideOptions& o, RunDirectory& out, Metrics& metrics) {
   at::set_num_threads(out.threads());
   const std::vector<Contender> all = contenders(o);
-  const FitStore store(out);
+  const FinishedFits finished(out);
   const std::vector<Motion> todo = motions(o);
   const std::size_t fits = todo.size() * all.size();
   std::vector<OutsideCell> cells;
@@ -198,7 +112,7 @@ void run(const OutsideOptions& o, RunDirectory& out, Metrics& metrics) {
       if (!seen || by.name == motion.family) continue;
       std::fprintf(stderr, "%s in %s, by %s (%zu of %zu)\n", motion.law.c_str(),
                    motion.scene.c_str(), by.name.c_str(), done, fits);
-      cells.push_back(make_cell(motion, by, *seen, o, store));
+      cells.push_back(make_cell(motion, by, *seen, o, finished));
     }
     if (cells.empty()) continue;
     // After each, so that there is something to look at meanwhile.

@@ -9,6 +9,8 @@
 #include <limits>
 #include <map>
 
+#include "uniphy/inference/candidate_fit.hpp"
+#include "uniphy/inference/misfit.hpp"
 #include "uniphy/inference/observed_noise.hpp"
 #include "uniphy/inference/rung_fitter.hpp"
 #include "uniphy/inference/term_split.hpp"
@@ -23,13 +25,11 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// Iterations at each horizon that show which start is worth going on with: of water and jelly,
 /// begun from codes of other materials, the right ones are ahead after three.
 constexpr int kTrialIterations = 4;
-/// How strongly the law's own numbers are pulled to where they began (Pull::weight): on the first
-/// horizon, from one horizon to the next, and on the last one from one fit to the next. Without it
-/// the numbers that a short horizon hardly shows run off, and the fit ends where the next horizon
-/// cannot bring them back: the jelly cube's then ended at 1e-3 of the size for 3e-5 with it.
-constexpr double kFirstPull = 1e-3, kPullOfHorizons = 0.3, kPullOfFits = 0.1;
-/// The least of it, where there is no noise: what double roll-outs tell apart.
-constexpr double kLeastPull = 1e-6;
+/// Fits of z between which the starts of noisy points are moved to where the last one has them: the
+/// flow that says where is that of the fit before.
+constexpr int kStartRounds = 3;
+/// Iterations of those after the first.
+constexpr int kRoundIterations = 4;
 /// Iterations, and the share of the epochs, of the last fit to the whole observation: it begins
 /// next to where it ends.
 constexpr int kLastIterations = 4;
@@ -57,7 +57,7 @@ class Ladder {
  public:
   Ladder(const Observation& observation, const std::string& name, const FitVariables& latent,
          const FitOptions& options, const AdaptationOptions& adaptation, const FitHooks& hooks,
-         std::ptrdiff_t fitted_frames)
+         std::ptrdiff_t fitted_frames, bool fits_starts)
       : observation_(observation),
         part_(first_frames(observation, fitted_frames)),
         name_(name),
@@ -65,17 +65,22 @@ class Ladder {
         options_(options),
         adaptation_(adaptation),
         hooks_(hooks),
-        fitter_(observation, name, latent, options, adaptation, hooks),
+        fitted_frames_(fitted_frames),
+        fits_starts_(fits_starts),
+        fitter_(observation_, name, latent, options, adaptation, hooks),
         noise_(observed_noise(observation) / fitter_.size()),
-        enough_(std::hypot(adaptation.enough, 2 * noise_)) {}
+        enough_(std::hypot(adaptation.enough, (fits_starts ? kNoiseAllowance : 2) * noise_)) {}
 
   Adaptation run() {
     Climber best = fit_latent();
+    result_.seen = observation_;
+    result_.starts_fitted = fits_starts_;
+    if (fitted_frames_ == observation_.frames) return only_latent(best);
     for (const Rung rung : adaptation_.rungs) {
       if (rung == Rung::latent) continue;
       if (std::max(best.fitted, best.kept) <= enough_) break;
       const Climber next = rung == Rung::numbers ? fit_numbers(best) : fit_weights(best);
-      if (!pays(next, best)) break;
+      if (!pays(next, best) || !fitter_.lasts(next.point, rung)) break;
       best = next;
       result_.rung = rung;
     }
@@ -88,17 +93,16 @@ class Ladder {
     return std::isfinite(next.kept) && next.kept <= (1 - adaptation_.gain) * best.kept;
   }
 
-  /// Noise tells a number with a spread of 1 from where it began by so much.
   double least_pull() const {
-    const double coordinates = 3.0 * double(observation_.particles) * double(part_.frames);
-    return std::max(kLeastPull, noise_ / std::sqrt(coordinates));
+    return uniphy::least_pull(noise_, 3.0 * double(observation_.points()) * double(part_.frames));
   }
 
   /// The errors of the two parts.
   void judge(Climber& c, Rung rung) const {
     const std::vector<double> root = fitter_.roots(c.point, rung, observation_.frames);
     c.fitted = root_mean_square(root, 0, part_.frames);
-    c.kept = root_mean_square(root, part_.frames, observation_.frames);
+    if (part_.frames < observation_.frames)
+      c.kept = root_mean_square(root, part_.frames, observation_.frames);
   }
 
   /// The same, for the report.
@@ -125,10 +129,33 @@ class Ladder {
     fitter_.report(Rung::latent).seconds += task.seconds;
     fitter_.set_motion(result_.fit.motion);
     Climber c{latent_.label(result_.fit.start), to_tensor(result_.fit.u), {}};
-    c.point = fitter_.least_squares(part_, part_.frames, Rung::latent, c.point,
-                                    {c.point, least_pull()}, "code", adaptation_.iterations);
+    const bool converged = options_.stages.back().optimizer == kLevenbergMarquardt;
+    const int rounds = fits_starts_ ? kStartRounds : converged ? 0 : 1;
+    for (int round = 0; round < rounds; ++round) {
+      const std::string name = round == 0 ? "code" : fmt::format("code, round {}", round + 1);
+      c.point =
+          fitter_.least_squares(part_, part_.frames, Rung::latent, c.point, {c.point, least_pull()},
+                                name, round == 0 ? adaptation_.iterations : kRoundIterations, true);
+      if (fits_starts_) move_starts(Rung::latent, c.point, part_);
+    }
     conclude(c, Rung::latent);
     return c;
+  }
+
+  /// Moves the starts of the points to where a law and the frames of `seen` have them.
+  void move_starts(Rung rung, const Tensor& point, const Observation& seen) {
+    observation_ = with_corrected_starts(observation_, fitter_.start_shift(seen, rung, point));
+    part_ = first_frames(observation_, fitted_frames_);
+  }
+
+  /// All frames were fitted, and there is nothing to choose.
+  Adaptation only_latent(const Climber& c) {
+    FitResult& fit = result_.fit;
+    fit.law = latent_.law(c.point);
+    fit.u.assign(c.point.data_ptr<double>(), c.point.data_ptr<double>() + c.point.numel());
+    fit.motion = fitter_.motion();
+    fit.mse = c.fitted * c.fitted * fitter_.size() * fitter_.size();
+    return result_;
   }
 
   /// The best start of every material.
@@ -188,9 +215,9 @@ class Ladder {
     for (std::size_t s = 0; s + 1 < horizons.size(); ++s) {
       if (s > 0) pull *= kPullOfHorizons;
       for (Climber& c : climbers) {
-        c.point = fitter_.least_squares(part_, horizons[s], Rung::numbers, c.point,
-                                        {c.start, std::max(pull, least_pull())},
-                                        fmt::format("{} {}", c.name, s + 1), kTrialIterations);
+        c.point = fitter_.least_squares(
+            part_, horizons[s], Rung::numbers, c.point, {c.start, std::max(pull, least_pull())},
+            fmt::format("{} {}", c.name, s + 1), kTrialIterations, false);
         c.kept = root_mean_square(fitter_.roots(c.point, Rung::numbers, horizons[s + 1]),
                                   horizons[s], horizons[s + 1]);
       }
@@ -201,9 +228,9 @@ class Ladder {
     Climber best = climbers.front();
     for (int k = 1; pull > least_pull(); ++k) {
       pull = std::max(kPullOfFits * pull, least_pull());
-      best.point =
-          fitter_.least_squares(part_, part_.frames, Rung::numbers, best.point, {best.start, pull},
-                                fmt::format("{} last {}", best.name, k), adaptation_.iterations);
+      best.point = fitter_.least_squares(
+          part_, part_.frames, Rung::numbers, best.point, {best.start, pull},
+          fmt::format("{} last {}", best.name, k), adaptation_.iterations, false);
     }
     conclude(best, Rung::numbers);
     return best;
@@ -224,15 +251,21 @@ class Ladder {
     const std::string task = "all frames";
     const Rung rung = result_.rung;
     Climber last = best;
-    last.point = rung == Rung::weights
-                     ? fitter_.descend(observation_, best.point, task,
-                                       std::max(1, adaptation_.epochs / kLastShare))
-                     : fitter_.least_squares(observation_, observation_.frames, rung, best.point,
-                                             {best.point, least_pull()}, task, kLastIterations);
+    last.point =
+        rung == Rung::weights
+            ? fitter_.descend(observation_, best.point, task,
+                              std::max(1, adaptation_.epochs / kLastShare))
+            : fitter_.least_squares(observation_, observation_.frames, rung, best.point,
+                                    {best.point, least_pull()}, task, kLastIterations, true);
+    if (rung != Rung::latent && !fitter_.lasts(last.point, rung)) last.point = best.point;
+    if (fits_starts_ && rung != Rung::weights)
+      move_starts(rung, last.point, Observation(observation_));
+    result_.seen = observation_;
     const AdaptedVariables& chosen = fitter_.variables(rung);
     const Tensor code = chosen.code(last.point).contiguous();
     FitResult& fit = result_.fit;
     fit.law = chosen.law(last.point);
+    fit.motion = fitter_.motion();
     fit.u.assign(code.data_ptr<double>(), code.data_ptr<double>() + code.numel());
     const double root = root_mean_square(fitter_.roots(last.point, rung, observation_.frames), 0,
                                          observation_.frames);
@@ -240,13 +273,15 @@ class Ladder {
     result_.rungs = fitter_.reports();
   }
 
-  const Observation& observation_;
-  const Observation part_;  ///< what is fitted until the rung is chosen
+  Observation observation_;  ///< with the starts that were found
+  Observation part_;         ///< what is fitted until the rung is chosen
   const std::string& name_;
   const FitVariables& latent_;
   const FitOptions& options_;
   const AdaptationOptions& adaptation_;
   const FitHooks& hooks_;
+  const std::ptrdiff_t fitted_frames_;
+  const bool fits_starts_;
   RungFitter fitter_;
   double noise_, enough_;  ///< over size
   Adaptation result_;
@@ -259,14 +294,20 @@ Adaptation adapt(const Observation& observation, const std::string& name,
                  const AdaptationOptions& adaptation, const FitHooks& hooks) {
   const FitProblem problem(observation, name, variables, options);
   const std::ptrdiff_t frames = observation.frames, contact = problem.contact();
-  const std::ptrdiff_t fitted =
-      std::min(horizon_frames(1 - adaptation.kept, contact, frames), frames - 1);
-  if (contact >= fitted || adaptation.rungs.size() < 2 || !can_be_adapted(variables)) {
+  std::ptrdiff_t fitted = frames;
+  if (adaptation.rungs.size() > 1 && can_be_adapted(variables)) {
+    fitted = std::min(horizon_frames(1 - adaptation.kept, contact, frames), frames - 1);
+  }
+  const bool climbs = fitted < frames && contact < fitted;
+  if (contact >= frames) {
     Adaptation result;
     result.fit = fit_observation(observation, name, variables, options, hooks);
+    result.seen = observation;
     return result;
   }
-  return Ladder(observation, name, variables, options, adaptation, hooks, fitted).run();
+  return Ladder(observation, name, variables, options, adaptation, hooks, climbs ? fitted : frames,
+                problem.fits_starts())
+      .run();
 }
 
 }  // namespace uniphy

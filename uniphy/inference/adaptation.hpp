@@ -30,6 +30,10 @@ struct Adaptation {
   FitResult fit;  ///< of the rung chosen; its u is that of the latent variables
   Rung rung = Rung::latent;
   std::vector<RungReport> rungs;  ///< those that were tried; empty where nothing was kept
+  /// What was observed with the starts of its points where they were found to be, see
+  /// StartCorrection.
+  Observation seen;
+  bool starts_fitted = false;
 };
 
 /// Finds the law of an observation with as much freedom as its motion asks for: z; then also the
@@ -41,7 +45,7 @@ struct Adaptation {
 ///    by Descent.
 /// 2. The frames that were kept decide. The ladder ends where a rung explains both parts to
 ///    `enough` and the noise, or where the next one does not take away `gain` of the error on the
-///    kept part; then the one before is the result.
+///    kept part, or cannot be simulated for as long again; then the one before is the result.
 /// 3. Not only the fitted z goes up to `numbers`: the best start of every other material does too,
 ///    since the nearest code of the trained family may be of the wrong kind, and points at which
 ///    the two terms of the elastic stress are apart (split_terms). They are fitted over horizons
@@ -49,10 +53,15 @@ struct Adaptation {
 ///    go on. All are pulled to where they began, less and less, until no more than the noise says.
 /// 4. The rung chosen is fitted to the whole observation, from where it is.
 ///
-/// Without a contact, with analytic variables, which have no rungs, and where `latent` is the only
-/// one, it is fit_observation. Resumes like it, with adaptation_state_file() beside its state file.
-/// Results have the same bits on any number of threads. hooks.on_record is called after every step
-/// above z too, with a stage beyond those of the schedule and infinite horizon.
+/// With z the initial velocity is fitted by LevenbergMarquardt. Where the points are tracers or
+/// noisy, where they start is, too (StartCorrection): eliminated within a fit and moved after it,
+/// until that settles. Noise-free observations of particles start where they are seen.
+///
+/// Analytic variables have no rung but `latent`; where that is the only one, all frames are fitted.
+/// Without a contact it is fit_observation alone. Resumes like it, with adaptation_state_file()
+/// beside its state file. Results have the same bits on any number of threads. hooks.on_record is
+/// called after every step above z too, with a stage beyond those of the schedule and infinite
+/// horizon.
 Adaptation adapt(const Observation& observation, const std::string& name,
                  const FitVariables& variables, const FitOptions& options,
                  const AdaptationOptions& adaptation, const FitHooks& hooks = {});

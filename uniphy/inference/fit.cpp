@@ -6,15 +6,16 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <deque>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <set>
 
 #include "ops/kernels/base/error.hpp"
 #include "ops/kernels/base/for_each.hpp"
-#include "uniphy/inference/descent.hpp"
+#include "uniphy/inference/candidate_fit.hpp"
 #include "uniphy/inference/fit_problem.hpp"
+#include "uniphy/inference/levenberg_marquardt.hpp"
 #include "uniphy/report/interrupt.hpp"
 #include "uniphy/report/progress.hpp"
 
@@ -54,8 +55,14 @@ class Fit {
 
   std::int64_t total_work() const {
     std::int64_t total = variables_.starts();
-    for (const FitStage& s : options_.stages) total += std::int64_t(s.candidates) * s.epochs;
+    for (const FitStage& s : options_.stages) total += std::int64_t(s.candidates) * most_work(s);
     return total;
+  }
+
+  /// Roll-outs of a candidate in a stage, at most.
+  std::int64_t most_work(const FitStage& stage) const {
+    if (stage.optimizer != kLevenbergMarquardt) return stage.epochs;
+    return std::int64_t(stage.epochs) * (variables_.size() + LevenbergMarquardt::kTrials);
   }
 
   /// Saves where it is time to, tells the user, and stops where the user asked for it.
@@ -63,7 +70,7 @@ class Fit {
     const auto clock = std::chrono::steady_clock::now();
     const bool due = std::chrono::duration<double>(clock - saved_).count() >= hooks_.save_seconds;
     if (!hooks_.state_file.empty() && (now || due || interrupt_requested())) {
-      keep_descents();
+      keep_optimizers();
       write_fit_state(hooks_.state_file, state_, hooks_.fingerprint);
       saved_ = clock;
     }
@@ -124,51 +131,48 @@ class Fit {
     checkpoint(0, true);
   }
 
-  void make_descents() {
-    const FitStage& now = options_.stages[state_.stage];
-    const DescentOptions settings{now.optimizer, now.rate, now.epochs, options_.clip,
-                                  options_.patience};
+  void make_fits() {
     const bool same_leaves = state_.stage > 0 && problem_.with_velocity(state_.stage) ==
                                                      problem_.with_velocity(state_.stage - 1);
     for (const FitCandidate& c : state_.candidates) {
-      descents_.emplace_back(settings, problem_.leaves(c, state_.stage));
+      fits_.push_back(make_candidate_fit(problem_, c, state_.stage, options_));
       if (state_.steps > 0) {
-        resume(descents_.back(), c.optimizer);
+        resume(*fits_.back(), c.optimizer);
       } else if (same_leaves) {
-        descents_.back().inherit(c.optimizer);
+        fits_.back()->inherit(c.optimizer);
       }
     }
   }
 
-  void resume(Descent& descent, const std::string& bytes) const {
+  void resume(CandidateFit& fit, const std::string& bytes) const {
     try {
-      descent.load(bytes);
+      fit.load(bytes);
     } catch (const Error& error) {
       throw Error(fmt::format("{}: {}", hooks_.state_file.string(), error.what()));
     }
   }
 
   /// The state of the optimizers, for the file and for the next stage.
-  void keep_descents() {
-    for (std::size_t i = 0; i < descents_.size(); ++i) {
-      state_.candidates[i].optimizer = descents_[i].save();
+  void keep_optimizers() {
+    for (std::size_t i = 0; i < fits_.size(); ++i) {
+      state_.candidates[i].optimizer = fits_[i]->save();
     }
   }
 
   void improve() {
-    const int epochs = options_.stages[state_.stage].epochs;
+    const std::int64_t most = most_work(options_.stages[state_.stage]);
     const int count = static_cast<int>(state_.candidates.size());
     const std::int64_t work_before = done_;
-    make_descents();
+    make_fits();
     while (true) {
       std::vector<int> active;
       for (int i = 0; i < count; ++i) {
-        if (!descents_[i].done()) active.push_back(i);
+        if (!fits_[i]->done()) active.push_back(i);
       }
       if (active.empty()) break;
       std::vector<std::vector<FitRecord>> records(active.size());
       kernels::for_each(static_cast<int>(active.size()), [&](int k) {
-        records[k] = step(state_.candidates[active[k]], descents_[active[k]]);
+        records[k] = step(state_.candidates[active[k]], *fits_[active[k]]);
       });
       ++state_.steps;
       std::int64_t work = 0;
@@ -180,26 +184,18 @@ class Fit {
       }
       checkpoint(work, false);
     }
-    keep_descents();
-    descents_.clear();
-    done_ = work_before + std::int64_t(count) * epochs;  // what stopped early counts as done
+    keep_optimizers();
+    fits_.clear();
+    done_ = work_before + count * most;  // what stopped early counts as done
   }
 
   /// One step of a candidate's optimizer; keeps the best point in `best`.
-  std::vector<FitRecord> step(FitCandidate& best, Descent& descent) const {
+  std::vector<FitRecord> step(FitCandidate& best, CandidateFit& fit) const {
     std::vector<FitRecord> records;
-    const int before = descent.evaluations();
-    descent.step([&] {
-      const FitProblem::Evaluation at = problem_.evaluate(descent.leaves(), state_.stage);
+    const int before = fit.roll_outs();
+    fit.step(best, [&](double mse) {
       records.push_back({state_.stage, best.start, before + static_cast<int>(records.size()),
-                         problem_.horizon_time(state_.stage), at.mse});
-      if (const double loss = at.loss.item<double>(); loss < best.loss) {
-        best.loss = loss;
-        best.mse = at.mse;
-        best.u = descent.leaves()[0].detach().clone();
-        if (descent.leaves().size() > 1) best.motion = descent.leaves()[1].detach().clone();
-      }
-      return at.loss;
+                         problem_.horizon_time(state_.stage), mse});
     });
     return records;
   }
@@ -291,7 +287,7 @@ class Fit {
   const FitOptions& options_;
   const FitHooks& hooks_;
   FitState state_;
-  std::deque<Descent> descents_;  ///< of the candidates, while a stage is under way
+  std::vector<std::unique_ptr<CandidateFit>> fits_;  ///< of the candidates, while in a stage
   std::optional<Progress> progress_;
   std::int64_t done_ = 0;
   std::chrono::steady_clock::time_point saved_ = std::chrono::steady_clock::now();

@@ -13,8 +13,11 @@
 
 namespace uniphy {
 
+inline constexpr const char* kLevenbergMarquardt = "levenberg_marquardt";
+
 /// One stage of the schedule: `candidates` points, each improved by at most `epochs` roll-outs with
-/// their gradients, compared up to the horizon.
+/// their gradients (lbfgs, adamw) or as many Jacobians (kLevenbergMarquardt), compared up to the
+/// horizon.
 struct FitStage {
   double horizon = 1;  ///< share of the time from first contact to the last frame, (0, 1]
   int candidates = 1;
@@ -26,11 +29,9 @@ struct FitStage {
 struct FitOptions {
   std::string dtype = "float32";
   std::string rollout = "fused";  ///< or stepwise, see make_motion_objective
-  int velocity_frames = 1;       ///< frames after the first that the initial velocity is taken from
-  bool refine_velocity = false;  ///< the last stage also fits the initial velocity
-  double prior = 0;              ///< weight of ‖z‖²/σ² against mse/size²
-  double prior_sigma = 1;        ///< σ
-  double pull = 0;               ///< weight of FitVariables::departure, likewise
+  double prior = 0;               ///< weight of ‖z‖²/σ² against mse/size²
+  double prior_sigma = 1;         ///< σ
+  double pull = 0;                ///< weight of FitVariables::departure, likewise
   double clip = 10;
   int patience = 8;  ///< a candidate is left as it is after so many evaluations without 1 % gained
   std::vector<FitStage> stages;  ///< the last one has horizon 1
@@ -82,14 +83,14 @@ struct FitHooks {
 /// 2. The first stage begins with the best start of each material at the first horizon, the best
 ///    over all frames, and then the best that keep a distance from those chosen: one start that
 ///    fits the first moments may stand for the wrong kind of material and not leave it.
-/// 3. Each stage improves its candidates by gradients; the next one keeps the best at its own,
+/// 3. Each stage improves its candidates; the next one keeps the best at its own,
 ///    longer horizon (and, but for the last stage, the best of each material first). A candidate
 ///    whose roll-out fails has infinite loss and goes first.
 /// 4. The best evaluation over all frames is the result.
 ///
-/// A candidate's u, and the initial velocity where it is fitted, are the leaves of a graph that
-/// ends in the loss; backward() reaches them through the op of the roll-out, and an optimizer of
-/// Torch moves them (Descent).
+/// A candidate's u, and in the last stage the initial velocity, are what an optimizer of Torch
+/// moves (make_candidate_fit): leaves of a graph that ends in the loss, which backward() reaches
+/// through the op of the roll-out, or least squares with a Jacobian by differences.
 ///
 /// Candidates are improved side by side; results have the same bits for any number of threads.
 /// Throws Error where no start can be simulated up to the first horizon, or where the state file

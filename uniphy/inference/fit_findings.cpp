@@ -9,14 +9,6 @@
 #include "uniphy/scene/scene_warnings.hpp"
 
 namespace uniphy {
-namespace {
-
-/// Noise over size from which the initial velocity of one frame is worth a word: at 0.5 % the fit
-/// of a soft cube misses by 2.8 % with velocity.frames = 1 and by the noise alone with 8.
-constexpr double kNoisy = 1e-3;
-
-}  // namespace
-
 bool FittedParameter::outside() const {
   constexpr double kRounding = 1e-6;
   return value < range[0] * (1 - kRounding) || value > range[1] * (1 + kRounding);
@@ -74,18 +66,15 @@ std::vector<std::string> fit_warnings(const Inference& inference, const Observat
     warn(
         fmt::format("the fit misses the positions by {:.2g} % of the size, where {:.2g} % tell one "
                     "material from another: the law, the scene or the start of the observation is "
-                    "not what the fit takes it for, or the fit got stuck{}",
-                    100 * misfit / check.size, 100 * explained / check.size,
-                    check.noise > kNoisy * check.size
-                        ? "; where there is noise, velocity.frames takes the start from more frames"
-                        : ""));
+                    "not what the fit takes it for, or the fit got stuck",
+                    100 * misfit / check.size, 100 * explained / check.size));
   }
   if (!inference.explained) {
     warn(fmt::format(
         "the law found does not explain the motion: it misses the positions by {:.2g} % "
         "of the size, where noise and tolerance account for {:.2g} %; {}",
         100 * inference.misfit.over_size, 100 * inference.misfit.allowed,
-        misfit_place(inference.misfit, observation)));
+        misfit_place(inference.misfit, inference.seen)));
   }
   if (!fit.determined) return warnings;
   for (const FittedParameter& p : fitted_parameters(fit.law, variables)) {

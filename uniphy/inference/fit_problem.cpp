@@ -3,15 +3,25 @@
 #include <fmt/format.h>
 #include <torch/torch.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "ops/kernels/base/error.hpp"
+#include "uniphy/inference/observed_noise.hpp"
+#include "uniphy/inference/start_correction.hpp"
 
 namespace uniphy {
 namespace {
 
 using torch::Tensor;
+
+/// Noise over size above which the gradients fit the initial velocity, too: below it the positions
+/// of the first frames tell it better than a law that is still far off.
+constexpr double kNoisy = 1e-4;
+/// From here on the starts of the points are fitted. Below it, what they are off by is no more than
+/// a law from outside of the family leaves.
+constexpr double kNoisyStarts = 1e-3;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
@@ -31,26 +41,41 @@ FitProblem::FitProblem(const Observation& observation, const std::string& name,
       steps_(observed_steps(observation, name)),
       grid_(observed_grid(observation, name)),
       size_(observed_size(observation)),
-      motion_(motion != nullptr
-                  ? *motion
-                  : observed_motion(observation, steps_, grid_, options.velocity_frames)),
+      motion_(motion != nullptr ? *motion : observed_motion(observation, steps_, grid_)),
       contact_(first_contact(observation, steps_, grid_, motion_)),
+      noise_(observed_noise(observation)),
+      fits_velocity_(observation.tracked() || noise_ > kNoisy * size_),
+      fits_starts_(observation.tracked() || noise_ > kNoisyStarts * size_),
       objective_(
           make_motion_objective(observation, steps_, grid_, options.dtype, options.rollout)) {
   if (options.stages.empty() || options.stages.back().horizon < 1) {
     throw Error("stages: expected a last stage with horizon 1");
   }
   kernels::make_law<double>(variables.law(variables.start(0)));  // a model that does not fit: now
-  const std::vector<double> x(observation.x.begin(),
-                              observation.x.begin() + 3 * observation.particles);
+  std::vector<double> x = observation.start();
+  x.insert(x.end(), observation.tracers.begin(), observation.tracers.end());
   v0_ = torch::tensor(motion_.velocities(x), torch::kFloat64).view({-1, 3});
   const Eigen::Vector3d& centre = motion_.centre;
   arm_ = torch::tensor(x, torch::kFloat64).view({-1, 3}) -
          torch::tensor({centre[0], centre[1], centre[2]}, torch::kFloat64);
+  const Tensor hidden = torch::tensor(observation.x, torch::kFloat64).isnan();
+  if (hidden.any().item<bool>()) hidden_ = hidden.view({observation.frames, -1});
 }
 
 std::ptrdiff_t FitProblem::frames(int stage) const {
   return horizon_frames(options_.stages[stage].horizon, contact_, observation_.frames);
+}
+
+double FitProblem::seen(std::ptrdiff_t frames) const {
+  return objective_->seen_per_frame() * static_cast<double>(frames);
+}
+
+double least_pull(double noise, double coordinates) {
+  return std::max(1e-6, noise / std::sqrt(coordinates));
+}
+
+double FitProblem::least_pull(std::ptrdiff_t frames) const {
+  return uniphy::least_pull(noise_ / size_, seen(frames));
 }
 
 double FitProblem::horizon_time(int stage) const {
@@ -61,7 +86,7 @@ FitCandidate FitProblem::candidate(int start) const {
   FitCandidate c;
   c.start = start;
   c.u = torch::tensor(variables_.start(start), torch::kFloat64);
-  c.motion = torch::zeros({6}, torch::kFloat64);
+  c.motion = torch::zeros({kMotion}, torch::kFloat64);
   return c;
 }
 
@@ -91,15 +116,41 @@ Tensor FitProblem::loss_of(const Tensor& mse, const Tensor& u) const {
   return departure.defined() ? loss + options_.pull * departure : loss;
 }
 
-Tensor FitProblem::residuals(const Tensor& u, std::ptrdiff_t frames) const {
+Tensor FitProblem::misses(const Tensor& point, std::ptrdiff_t frames) const {
   const torch::NoGradGuard no_grad;
-  const std::int64_t P = observation_.particles, all = 3 * P * frames;
+  const std::int64_t size = variables_.size();
+  const Tensor v0 = point.numel() > size ? velocities(point.slice(0, size)) : v0_;
+  return objective_->residuals(variables_.body(point.slice(0, 0, size), observation_.particles), v0,
+                               frames);
+}
+
+RigidMotion FitProblem::motion_at(const Tensor& point) const {
+  FitCandidate at;
+  at.motion = point.numel() > variables_.size() ? point.slice(0, variables_.size()).contiguous()
+                                                : torch::zeros({kMotion}, torch::kFloat64);
+  return motion(at);
+}
+
+StartCorrection FitProblem::start_correction(const Tensor& point, std::ptrdiff_t frames) const {
+  return {objective_->flow_gradients(variables_.law(point.slice(0, 0, variables_.size())),
+                                     motion_at(point), frames),
+          hidden_};
+}
+
+Tensor FitProblem::residuals(const Tensor& point, std::ptrdiff_t frames,
+                             const StartCorrection* starts) const {
+  const torch::NoGradGuard no_grad;
+  const std::int64_t P = observation_.points(), all = 3 * P * frames;
   try {
-    Tensor r = objective_->residuals(variables_.body(u, P), v0_, frames).view({frames, P, 3});
+    Tensor r = misses(point, frames);
+    if (starts != nullptr) r = starts->remaining(r);
+    r = r.view({frames, P, 3});
     const std::int64_t stride = (all + kMostResiduals - 1) / kMostResiduals;
     if (stride > 1) r = r.slice(1, 0, P, stride);
-    r = r.flatten() / (size_ * std::sqrt(static_cast<double>(r.numel())));
+    const double seen = objective_->seen_per_frame() / static_cast<double>(3 * P);
+    r = r.flatten() / (size_ * std::sqrt(static_cast<double>(r.numel()) * seen));
     if (!r.isfinite().all().item<bool>()) return {};
+    const Tensor u = point.slice(0, 0, variables_.size());
     const Tensor prior = prior_weight() > 0 ? variables_.prior(u) : Tensor();
     return prior.defined() ? torch::cat({r, (prior_weight() * prior).sqrt().view({1})}) : r;
   } catch (const Error&) {  // the roll-out failed
@@ -112,8 +163,14 @@ double FitProblem::loss(double mse, const Tensor& u) const {
   return loss_of(torch::scalar_tensor(mse, torch::kFloat64), u).item<double>();
 }
 
+double FitProblem::mse_of(double loss, const Tensor& u) const {
+  const double of_u = this->loss(0, u);
+  return (loss - of_u) * size_ * size_;
+}
+
 bool FitProblem::with_velocity(int stage) const {
-  return options_.refine_velocity && stage + 1 == stages();
+  if (stage + 1 < stages()) return false;
+  return fits_velocity_ || options_.stages[stage].optimizer == kLevenbergMarquardt;
 }
 
 std::vector<Tensor> FitProblem::leaves(const FitCandidate& c, int stage) const {

@@ -8,6 +8,8 @@
 
 namespace uniphy {
 
+class StartCorrection;
+
 /// What a fit minimises: the observation, the variables and the horizons of the schedule in one,
 /// with the loss and its gradient at a candidate. Knows nothing of the order in which points are
 /// tried. Immutable, so that candidates can be evaluated side by side.
@@ -23,6 +25,12 @@ class FitProblem {
   int stages() const { return static_cast<int>(options_.stages.size()); }
   std::ptrdiff_t contact() const { return contact_; }
   std::ptrdiff_t frames() const { return observation_.frames; }
+  /// Whether the points are tracers or so noisy that where they start has to be fitted, too.
+  bool fits_starts() const { return fits_starts_; }
+  /// How strongly least squares over the first `frames` are pulled to where they begin at least.
+  double least_pull(std::ptrdiff_t frames) const;
+  /// Coordinates that the first `frames` show, about.
+  double seen(std::ptrdiff_t frames) const;
   std::ptrdiff_t frames(int stage) const;  ///< that the stage compares
   double horizon_time(int stage) const;    ///< s
 
@@ -36,9 +44,15 @@ class FitProblem {
   /// mse/size² and the prior, at the candidate's u.
   double loss(double mse, const torch::Tensor& u) const;
 
-  /// Leaves to be moved in a stage, copies of the candidate's: u [size], and the change of the
-  /// initial velocity [6] where it is fitted too, in units of 0.1 m/s and 0.5 rad/s.
+  /// The error (m²) of a point with that loss.
+  double mse_of(double loss, const torch::Tensor& u) const;
+
+  /// Leaves to be moved in a stage, copies of the candidate's: u [size], and where it moves the
+  /// initial velocity the change of it [kMotion], in units of 0.1 m/s and 0.5 rad/s.
   std::vector<torch::Tensor> leaves(const FitCandidate& c, int stage) const;
+  /// Whether a stage moves the initial velocity: the last one does. Gradients do so only where
+  /// there is noise: else the first frames tell it better than a law that is still far off, and a
+  /// quasi-Newton method has six more directions to learn.
   bool with_velocity(int stage) const;
 
   struct Evaluation {
@@ -49,11 +63,21 @@ class FitProblem {
   /// undefined where the loss is not finite.
   Evaluation evaluate(const std::vector<torch::Tensor>& leaves, int stage) const;
 
-  /// What least squares minimise at u with the initial velocity that is known, over the first
-  /// `frames`: (x̂ − x)/size and the root of the prior, scaled so that the sum of the squares is
-  /// loss(). Undefined where the roll-out fails. Of very many particles, every n-th is taken, so
-  /// that a column of a Jacobian has no more than kMostResiduals numbers.
-  torch::Tensor residuals(const torch::Tensor& u, std::ptrdiff_t frames) const;
+  /// Numbers of the change of the initial velocity, in the units of leaves().
+  static constexpr int kMotion = 6;
+  /// What least squares minimise over the first `frames` at a point: u, or u and the change of the
+  /// initial velocity [size + kMotion]. (x̂ − x)/size, or what `starts`, of as many frames, leaves
+  /// of it, and the root of the prior, scaled so that the sum of the squares is loss(). Undefined
+  /// where the roll-out fails. Of very many points, every n-th is taken, so that a column of a
+  /// Jacobian has no more than kMostResiduals numbers.
+  torch::Tensor residuals(const torch::Tensor& point, std::ptrdiff_t frames,
+                          const StartCorrection* starts = nullptr) const;
+  /// x̂ − x [frames, 3 points], m, at such a point. Throws Error where the roll-out fails.
+  torch::Tensor misses(const torch::Tensor& point, std::ptrdiff_t frames) const;
+  /// The initial velocity at such a point.
+  RigidMotion motion_at(const torch::Tensor& point) const;
+  /// Of the starts, by the flow at such a point.
+  StartCorrection start_correction(const torch::Tensor& point, std::ptrdiff_t frames) const;
 
   [[noreturn]] void refuse_starts() const;  ///< says why the first one cannot be simulated
 
@@ -71,9 +95,17 @@ class FitProblem {
   double size_;
   RigidMotion motion_;
   std::ptrdiff_t contact_;
-  torch::Tensor v0_, arm_;  ///< [particles, 3] observed velocity, position from the centre
+  double noise_;  ///< m
+  bool fits_velocity_, fits_starts_;
+  /// [particles and tracers, 3] observed velocity, position from the centre
+  torch::Tensor v0_, arm_;
+  torch::Tensor hidden_;  ///< [frames, 3 points]; undefined: nothing is
   std::unique_ptr<const MotionObjective> objective_;
 };
+
+/// The error over size by which noise, over size, of so many coordinates tells a number with a
+/// spread of 1 from where it began; at least 1e-6, what double roll-outs tell.
+double least_pull(double noise, double coordinates);
 
 /// 8 MB a column: a Jacobian of thirty is 240 MB. The benchmark cube of the field over 1000 steps,
 /// a frame every 5, has 603,000.

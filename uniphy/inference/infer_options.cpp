@@ -19,20 +19,12 @@ constexpr const char* kRangeText =
 FitOptions read_fit_options(Section& config) {
   FitOptions options;
   options.dtype = config.choice("dtype", std::string("float32"), {"float32", "float64"},
-                                "precision of the roll-outs");
+                                "precision of the roll-outs that gradients go through");
 
   options.rollout = config.choice(
       "rollout", std::string("fused"), {"fused", "stepwise"},
       "fused: one op with an adjoint of its own; stepwise: Algorithm 2 line by line, the same "
       "numbers for several times the time and memory");
-
-  Section velocity = config.section(
-      "velocity", "the initial velocity: a rigid motion, from observed positions alone");
-  options.velocity_frames = static_cast<int>(
-      velocity.integer("frames", 1, between(1, 1000), "",
-                       "frames after the first that it is taken from; more where there is noise"));
-  options.refine_velocity =
-      velocity.boolean("refine", false, "fit it together with the material in the last stage");
 
   Section prior = config.section("prior", "adds weight |z|^2/sigma^2 to mse/size^2");
   options.prior = prior.real("weight", 0, between(0, 1e6), "", "0: no prior");
@@ -49,20 +41,28 @@ FitOptions read_fit_options(Section& config) {
                         "points that are improved; the best go on to the next stage", sizes);
   const auto epochs =
       schedule.integers("epochs", std::vector<std::int64_t>{8, 12, 40}, between(1, 100000), "",
-                        "roll-outs with gradients of each candidate", sizes);
+                        "roll-outs with gradients of each candidate (levenberg_marquardt: "
+                        "Jacobians, of which three to ten do)",
+                        sizes);
   const std::string method =
-      schedule.choice("optimizer", std::string("lbfgs"), {"lbfgs", "adamw"},
-                      "how candidates are improved: torch::optim::LBFGS (strong Wolfe) or AdamW");
-  const double rate =
-      schedule.real("rate", 0.1, Range{0, 1e3, true}, "",
-                    "length of the first step (adamw: of every step, falling along a cosine), in "
-                    "units of the spread of the training codes");
-  options.patience = static_cast<int>(
-      schedule.integer("patience", 8, at_least(1), "",
-                       "a candidate stops after so many epochs that gain less than 1 %"));
+      schedule.choice("optimizer", std::string("lbfgs"), {"lbfgs", "adamw", kLevenbergMarquardt},
+                      "how candidates are improved: by gradients, torch::optim::LBFGS (strong "
+                      "Wolfe) or AdamW, or by least squares with a Jacobian from differences");
+  const double rate = schedule.real(
+      "rate", 0.1, Range{0, 1e3, true}, "",
+      "lbfgs: length of the first step (adamw: of every step, falling along a cosine), in "
+      "units of the spread of the training codes");
+  options.patience = static_cast<int>(schedule.integer(
+      "patience", 8, at_least(1), "",
+      "lbfgs, adamw: a candidate stops after so many epochs that gain less than 1 %"));
   options.clip = schedule.real("clip", 10, Range{0, 1e6, true}, "",
                                "adamw: longest gradient, in multiples of their mean length");
   if (!config.describing()) {
+    if (method == kLevenbergMarquardt && options.dtype == "float32") {
+      config.fail("dtype", fmt::format("expected float64 with schedule.optimizer {}, whose "
+                                       "differences float32 cannot tell, found float32",
+                                       method));
+    }
     if (candidates.size() != horizon.size() || epochs.size() != horizon.size()) {
       schedule.fail("horizon",
                     fmt::format("expected lists of one length in horizon, candidates and epochs, "
@@ -82,6 +82,30 @@ FitOptions read_fit_options(Section& config) {
         {horizon[i], static_cast<int>(candidates[i]), static_cast<int>(epochs[i]), method, rate});
   }
   return options;
+}
+
+ObservationSource read_observation_source(Section& config) {
+  ObservationSource source;
+  source.file = config.input_file("observation", required, "observed positions (observation.h5)");
+  source.noise = config.real("noise", 0, between(0, 1), "m",
+                             "standard deviation of a coordinate; 0: what the observation says, "
+                             "else estimated from it");
+  Section s = config.section("resolution", "how finely the observation is simulated");
+  source.resolution.grid = static_cast<int>(
+      s.integer("grid", 0, between(0, 1024), "",
+                "nodes a side, on which the body is filled anew; 0: those of the observation"));
+  source.resolution.dt = s.real("dt", 0, between(0, 1), "s",
+                                "time step; 0: that of the observation, as much finer as the grid");
+  source.resolution.particles_a_cell = s.real("particles_a_cell", 8, between(1, 64), "",
+                                              "of a body that is filled: a surface, or on "
+                                              "another grid any");
+  return source;
+}
+
+Observation ObservationSource::load(std::vector<std::string>& warnings) const {
+  Observation seen = at_resolution(read_observation(file), resolution, file.string(), warnings);
+  if (noise > 0) seen.noise = noise;
+  return seen;
 }
 
 FitVariablesSource read_fit_variables(Section& config) {

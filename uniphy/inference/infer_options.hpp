@@ -9,11 +9,26 @@
 
 #include "uniphy/config/config.hpp"
 #include "uniphy/inference/fit.hpp"
+#include "uniphy/inference/resolution.hpp"
 
 namespace uniphy {
 
 /// Declares and reads the keys of a fit: schedule, optimizer, precision, prior, velocity.
 FitOptions read_fit_options(Section& config);
+
+/// What is observed, and how finely it is simulated.
+struct ObservationSource {
+  std::filesystem::path file;
+  Resolution resolution;
+  double noise = 0;  ///< m, takes the place of what the file says; 0: nothing does
+
+  /// Reads the file and fills the body where it has to be; adds what was mended in its surface to
+  /// `warnings`. Throws Error that names the file.
+  Observation load(std::vector<std::string>& warnings) const;
+};
+
+/// Declares and reads the keys observation, noise and resolution.
+ObservationSource read_observation_source(Section& config);
 
 /// What is fitted: the latent code of a model, or the parameters of an analytic law.
 struct FitVariablesSource {

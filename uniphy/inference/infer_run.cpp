@@ -6,11 +6,12 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numeric>
 
 #include "ops/kernels/base/hash.hpp"
 #include "uniphy/inference/fit_findings.hpp"
 #include "uniphy/inference/observed_motion.hpp"
-#include "uniphy/scene/comparison.hpp"
+#include "uniphy/inference/start_correction.hpp"
 
 namespace uniphy {
 namespace {
@@ -30,10 +31,16 @@ void add_weights(kernels::Hash& hash, const kernels::LawDescription& law) {
 Trajectory observed_trajectory(const Observation& observation) {
   Trajectory t;
   t.frames = observation.frames;
-  t.particles = observation.particles;
-  t.body.assign(observation.particles, 0);
+  const std::int64_t points = observation.points();
+  t.particles = points;
+  t.body.assign(points, 0);
   t.volume = observation.volume;
-  t.mass = observed_mass(observation);
+  if (observation.tracked()) {
+    const double all = std::accumulate(t.volume.begin(), t.volume.end(), 0.0);
+    t.volume.assign(points, all / static_cast<double>(points));
+  }
+  t.mass = t.volume;
+  for (double& m : t.mass) m *= observation.density;
   t.time = observation.time;
   for (const double time : observation.time) {
     t.step.push_back(std::llround((time - observation.time[0]) / observation.dt));
@@ -46,28 +53,33 @@ Inference infer(const Observation& observation, const std::string& name,
                 const FitVariables& variables, const FitOptions& options, const FitHooks& hooks,
                 const AdaptationOptions& adaptation) {
   Inference result;
-  const Adaptation adapted = adapt(observation, name, variables, options, adaptation, hooks);
+  const Adaptation adapted =
+      adapt(with_known_starts(observation, name), name, variables, options, adaptation, hooks);
   result.fit = adapted.fit;
   result.rung = adapted.rung;
   result.rungs = adapted.rungs;
-  result.size = observed_size(observation);
-  const Trajectory seen = observed_trajectory(observation);
-  result.fitted = seen;
+  result.seen = adapted.seen;
+  const Observation& seen = result.seen;
+  result.size = observed_size(seen);
+  result.fitted = observed_trajectory(seen);
   result.fitted.x.clear();
-  const ObservedSteps steps = observed_steps(observation, name);
-  const kernels::GridSettings grid = observed_grid(observation, name);
-  result.check = check_observation(
-      observation, steps, grid, observed_motion(observation, steps, grid, options.velocity_frames));
-  const auto objective = make_motion_objective(observation, steps, grid, options.dtype);
+  const ObservedSteps steps = observed_steps(seen, name);
+  const kernels::GridSettings grid = observed_grid(seen, name);
+  result.check = check_observation(seen, steps, grid, observed_motion(seen, steps, grid));
+  const auto objective = make_motion_objective(seen, steps, grid, options.dtype);
   objective->simulate(result.fit.law, result.fit.motion,
                       [&](std::ptrdiff_t, const std::vector<double>& x) {
                         result.fitted.x.insert(result.fitted.x.end(), x.begin(), x.end());
                       });
-  result.fit_mse =
-      compare_trajectories(result.fitted, seen, FrameMatch::all, "the fit", name).position_mse;
+  result.misfit = misfit_of(seen, result.fitted, adaptation.tolerance, adapted.starts_fitted);
+  result.fit_mse = std::pow(result.misfit.over_size * result.size, 2);
   result.best_start = *std::min_element(result.fit.start_mse.begin(), result.fit.start_mse.end());
-  result.misfit = misfit_of(observation, result.fitted, adaptation.tolerance);
   result.explained = explains(result);
+  if (result.fit.determined) {
+    result.reading = read_material(
+        result.fit.law, seen.dt,
+        strain_seen(objective->deformations(result.fit.law, result.fit.motion, seen.frames)));
+  }
   return result;
 }
 
@@ -75,7 +87,7 @@ bool explains(const Inference& inference) {
   const double allowed = inference.misfit.allowed;
   bool explains = inference.misfit.over_size <= allowed;
   for (const RungReport& r : inference.rungs) {
-    if (r.rung == inference.rung) explains = explains && r.kept <= kForecastAllowance * allowed;
+    if (r.rung == inference.rung) explains = explains && r.kept <= inference.misfit.allowed_ahead;
   }
   return explains;
 }
@@ -154,6 +166,7 @@ void add_metrics(Metrics& metrics, const Inference& inference, const Observation
   if (fit.determined) {
     metrics.set("contact_s", observation.time[fit.contact] - observation.time[0]);
   }
+  metrics.set("determined", fit.determined ? 1 : 0);
   metrics.set("explained", inference.explained ? 1 : 0);
   metrics.set("rung", static_cast<double>(inference.rung));
   for (const RungReport& r : inference.rungs) {
@@ -169,6 +182,18 @@ void add_metrics(Metrics& metrics, const Inference& inference, const Observation
     metrics.set(fmt::format("angular_velocity.{}", axes[k]), fit.motion.angular[k]);
   }
   if (!fit.determined) return;
+  const MaterialReading& m = inference.reading;
+  metrics.set("material." + m.material, 1);
+  const std::pair<const char*, double> readings[] = {{"mu", m.mu},
+                                                     {"lambda", m.lambda},
+                                                     {"young", m.young},
+                                                     {"poisson", m.poisson},
+                                                     {"yield_stress", m.yield_stress},
+                                                     {"friction_angle", m.friction_angle},
+                                                     {"viscosity", m.viscosity}};
+  for (const auto& [name, value] : readings) {
+    if (!std::isnan(value)) metrics.set(std::string("reading.") + name, value);
+  }
   metrics.set("nearest.distance", variables.nearest(fit.u, 1).front().distance);
   for (const FittedParameter& p : fitted_parameters(fit.law, variables)) {
     metrics.set("parameter." + p.name, p.value);
@@ -222,11 +247,15 @@ ParticlePicture frames_picture(const std::vector<std::pair<std::string, const Tr
       const std::int64_t frame = (trajectory->frames - 1) * c / std::max(1, columns - 1);
       ParticlePanel panel;
       panel.caption = fmt::format("{} {:.0f} ms", name, 1e3 * trajectory->time[frame]);
-      panel.x.assign(trajectory->positions(frame),
-                     trajectory->positions(frame) + 3 * trajectory->particles);
-      // Colour follows the particles: height at the first frame.
+      // Colour follows the particles: height at the first frame, of the last row where it is
+      // hidden.
+      const Trajectory& whole = *rows.back().second;
       for (std::int64_t p = 0; p < trajectory->particles; ++p) {
-        panel.colour.push_back(trajectory->positions(0)[3 * p + 1]);
+        const double* x = trajectory->positions(frame) + 3 * p;
+        const double height = trajectory->positions(0)[3 * p + 1];
+        if (std::isnan(x[0])) continue;
+        panel.x.insert(panel.x.end(), x, x + 3);
+        panel.colour.push_back(std::isnan(height) ? whole.positions(0)[3 * p + 1] : height);
       }
       picture.panels.push_back(std::move(panel));
     }
@@ -240,10 +269,12 @@ std::string fit_fingerprint(const Observation& observation, const FitVariables& 
   hash.add(observation.x);
   hash.add(observation.time);
   hash.add(observation.volume);
+  hash.add(observation.body);
+  hash.add(observation.tracers);
   hash.add(fmt::format("{} {} {} {} {} {} {}", observation.grid, observation.dt,
                        observation.gravity[0], observation.gravity[1], observation.gravity[2],
                        observation.walls, observation.bound));
-  hash.add(std::vector<double>{observation.density});
+  hash.add(std::vector<double>{observation.density, observation.noise});
   for (int i = 0; i < variables.starts(); ++i) hash.add(variables.start(i));
   add_weights(hash, variables.law(variables.start(0)));
   hash.add(text);

@@ -7,6 +7,7 @@
 
 #include "uniphy/inference/adaptation.hpp"
 #include "uniphy/inference/infer_options.hpp"
+#include "uniphy/inference/material_reading.hpp"
 #include "uniphy/inference/misfit.hpp"
 #include "uniphy/inference/observation_check.hpp"
 #include "uniphy/io/trajectory.hpp"
@@ -18,7 +19,8 @@ namespace uniphy {
 /// A finished inference and the roll-out of its result.
 struct Inference {
   FitResult fit;
-  Trajectory fitted;              ///< at the observed frames
+  Observation seen;               ///< with the starts of its points as fitted, see Adaptation
+  Trajectory fitted;              ///< the points at the observed frames
   double fit_mse = 0;             ///< m², of `fitted` against the observation
   double size = 0;                ///< m, largest side of the observed body
   double best_start = 0;          ///< m², what the best start reaches over all frames
@@ -26,21 +28,19 @@ struct Inference {
   Rung rung = Rung::latent;       ///< how far the law was adapted
   std::vector<RungReport> rungs;  ///< see Adaptation
   Misfit misfit;                  ///< of `fitted`
+  MaterialReading reading;        ///< of the fitted law; empty where it is not determined
   bool explained = true;  ///< whether noise and tolerance account for the misfit, see explains()
 };
 
-/// Fits and rolls out once more; z alone unless `adaptation` says otherwise. Throws Error.
+/// Fits and rolls out once more; z alone unless `adaptation` says otherwise. Points that are first
+/// seen after the contact are left out (with_known_starts). Throws Error.
 Inference infer(const Observation& observation, const std::string& name,
                 const FitVariables& variables, const FitOptions& options, const FitHooks& hooks,
                 const AdaptationOptions& adaptation = {{Rung::latent}});
 
 /// Whether noise and tolerance account for the misfit of all frames, and, where frames were kept,
-/// kForecastAllowance of them for the error there of the rung chosen before it saw them.
+/// for the error there of the rung chosen before it saw them (Misfit::allowed_ahead).
 bool explains(const Inference& inference);
-/// What a right law may miss in a forecast, over what it may in a fit: of the families and of laws
-/// from outside that the numbers hold, forecasts of the benchmark cube are off by two to four times
-/// the fit.
-inline constexpr double kForecastAllowance = 5;
 
 /// The product of uniphy_infer. `model` is the path that resimulate will look for. Names no
 /// nearest codes where the material is not determined.
@@ -61,9 +61,11 @@ std::optional<std::size_t> roll_outs_to_a_hundredth(const FitResult& fit);
 /// contact (1, or 0 where no wall acted before the last frame), contact_s,
 /// start_residual_over_size, start_allowed_over_size, start_frames, noise_over_size,
 /// energy_gain_over_kinetic (ObservationCheck; 0 of a body that does not move),
-/// velocity.{x,y,z}, angular_velocity.{x,y,z}; where the material is determined,
-/// explained (1 or 0), rung (0 latent, 1 numbers, 2 weights) and, where frames were kept, of every
-/// rung that was tried fitted_over_size.RUNG, kept_over_size.RUNG, roll_outs.RUNG, seconds.RUNG;
+/// velocity.{x,y,z}, angular_velocity.{x,y,z}, determined (1 or 0); where the material is
+/// determined, explained (1 or 0), rung (0 latent, 1 numbers, 2 weights) and, where frames were
+/// kept, of every rung that was tried fitted_over_size.RUNG, kept_over_size.RUNG, roll_outs.RUNG,
+/// seconds.RUNG; material.NAME (1 of what the law behaves like), reading.{mu, lambda, young,
+/// poisson, yield_stress, friction_angle, viscosity} where it has one (MaterialReading, SI units),
 /// nearest.distance and, of an analytic law, parameter.NAME and outside_range.NAME (1 where it
 /// ended outside of its range).
 void add_metrics(Metrics& metrics, const Inference& inference, const Observation& observation,
@@ -76,7 +78,8 @@ Chart loss_chart(const FitResult& fit, const FitVariables& variables, const std:
 ParticlePicture frames_picture(const std::vector<std::pair<std::string, const Trajectory*>>& rows,
                                int columns);
 
-/// A trajectory that holds what was observed.
+/// A trajectory of the points that holds what was observed, NaN where hidden; each has an equal
+/// part of the body where it is no particle.
 Trajectory observed_trajectory(const Observation& observation);
 
 /// 64 bits of everything in the observation and the starts, beside `text`, as hexadecimal digits:

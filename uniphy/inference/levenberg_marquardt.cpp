@@ -76,6 +76,11 @@ void LevenbergMarquardt::move_to(const Tensor& point) {
   }
 }
 
+void LevenbergMarquardt::forget_residuals() {
+  residuals_ = Tensor();
+  loss_ = kInfinity;
+}
+
 Tensor LevenbergMarquardt::step(LossClosure) {
   throw Error("Levenberg-Marquardt: expected a closure that gives residuals, found one of a loss");
 }

@@ -49,6 +49,9 @@ class LevenbergMarquardt : public torch::optim::Optimizer {
   /// Throws Error: a loss that is one number does not do.
   torch::Tensor step(LossClosure closure) override;
 
+  /// Says that the residuals at the leaves are others from now on.
+  void forget_residuals();
+
   /// Whether the last step found nothing lower with any damping.
   bool stuck() const { return stuck_; }
   double loss() const { return loss_; }  ///< ‖r‖² at the leaves

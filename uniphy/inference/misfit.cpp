@@ -15,17 +15,21 @@ namespace {
 constexpr int kThirds = 3;
 constexpr int kBlocks = kThirds * kThirds * kThirds;
 
-/// The block of every particle, x + 3 y + 9 z.
+std::vector<double> starts_of(const Observation& seen) {
+  return seen.tracked() ? seen.tracers : seen.start();
+}
+
+/// The block of every point, x + 3 y + 9 z.
 std::vector<int> blocks_of(const Observation& seen) {
-  const double* x = seen.positions(0);
-  std::vector<int> blocks(static_cast<std::size_t>(seen.particles), 0);
+  const std::vector<double> x = starts_of(seen);
+  std::vector<int> blocks(static_cast<std::size_t>(seen.points()), 0);
   for (int k = 0, weight = 1; k < 3; ++k, weight *= kThirds) {
     double low = x[k], high = x[k];
-    for (std::int64_t p = 0; p < seen.particles; ++p) {
+    for (std::int64_t p = 0; p < seen.points(); ++p) {
       low = std::min(low, x[3 * p + k]);
       high = std::max(high, x[3 * p + k]);
     }
-    for (std::int64_t p = 0; p < seen.particles; ++p) {
+    for (std::int64_t p = 0; p < seen.points(); ++p) {
       const double share = high > low ? (x[3 * p + k] - low) / (high - low) : 0;
       blocks[p] += weight * std::min(kThirds - 1, static_cast<int>(kThirds * share));
     }
@@ -36,7 +40,7 @@ std::vector<int> blocks_of(const Observation& seen) {
 void find_block(const Observation& seen, const std::vector<double>& square, Misfit& misfit) {
   const std::vector<int> blocks = blocks_of(seen);
   std::array<double, kBlocks> sum{}, count{};
-  for (std::int64_t p = 0; p < seen.particles; ++p) {
+  for (std::int64_t p = 0; p < seen.points(); ++p) {
     sum[blocks[p]] += square[p];
     ++count[blocks[p]];
   }
@@ -51,28 +55,36 @@ void find_block(const Observation& seen, const std::vector<double>& square, Misf
 
 }  // namespace
 
-Misfit misfit_of(const Observation& seen, const Trajectory& fitted, double tolerance) {
+Misfit misfit_of(const Observation& seen, const Trajectory& fitted, double tolerance,
+                 bool starts_fitted) {
   const double size = observed_size(seen);
   Misfit m;
   m.time = seen.time;
-  m.allowed = std::hypot(tolerance, 2 * observed_noise(seen) / size);
-  std::vector<double> square(static_cast<std::size_t>(seen.particles), 0);  // of a coordinate
+  const double noise = (starts_fitted ? kNoiseAllowance : 2) * observed_noise(seen) / size;
+  m.allowed = std::hypot(tolerance, noise);
+  m.allowed_ahead = std::hypot(kForecastAllowance * tolerance, noise);
+  std::vector<double> square(static_cast<std::size_t>(seen.points()), 0);  // of a coordinate
+  double all = 0;
   for (std::int64_t f = 0; f < seen.frames; ++f) {
-    double sum = 0, largest = 0;
-    for (std::int64_t p = 0; p < seen.particles; ++p) {
+    double sum = 0, largest = 0, count = 0;
+    for (std::int64_t p = 0; p < seen.points(); ++p) {
+      if (!seen.is_seen(f, p)) continue;
       double distance = 0;
       for (int k = 0; k < 3; ++k) {
         const double d = (fitted.positions(f)[3 * p + k] - seen.positions(f)[3 * p + k]) / size;
         distance += d * d;
       }
       square[p] += distance / (3.0 * double(seen.frames));
-      sum += distance / (3.0 * double(seen.particles));
+      sum += distance;
+      count += 3;
       largest = std::max(largest, distance);
     }
-    m.root.push_back(std::sqrt(sum));
+    m.root.push_back(count > 0 ? std::sqrt(sum / count) : 0);
     m.largest.push_back(std::sqrt(largest));
-    m.over_size += sum / double(seen.frames);
+    m.over_size += sum;
+    all += count;
   }
+  m.over_size /= all;
   m.over_size = std::sqrt(m.over_size);
   m.grows = seen.frames;
   while (m.grows > 0 && m.root[m.grows - 1] > m.allowed) --m.grows;
@@ -89,10 +101,11 @@ std::string misfit_place(const Misfit& m, const Observation& seen) {
       m.grows <= last
           ? fmt::format("from {:.3g} s on it stays above that", m.time[m.grows] - m.time[0])
           : fmt::format("it is largest at {:.3g} s", m.time[peak] - m.time[0]);
-  const double* x = seen.positions(0) + 3 * m.particle;
+  const std::vector<double> starts = starts_of(seen);
+  const double* x = starts.data() + 3 * m.particle;
   return fmt::format(
       "{}; it is largest, {:.2g} %, in the {} third along x, {} along y and {} along z of the body "
-      "at the first frame, and of particle {}, at ({:.3f}, {:.3f}, {:.3f}) m there",
+      "at the first frame, and of point {}, at ({:.3f}, {:.3f}, {:.3f}) m there",
       when, 100 * m.block_root, kThird[m.block[0]], kThird[m.block[1]], kThird[m.block[2]],
       m.particle, x[0], x[1], x[2]);
 }

@@ -3,10 +3,14 @@
 #include <omp.h>
 #include <torch/torch.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 
 #include "ops/kernels/base/error.hpp"
+#include "ops/kernels/laws/tracer.hpp"
+#include "uniphy/inference/observed_frames.hpp"
 #include "uniphy/inference/stepwise_rollout.hpp"
 
 namespace uniphy {
@@ -24,25 +28,38 @@ class RolloutObjective : public MotionObjective {
       : observation_(observation),
         steps_(steps),
         grid_(grid),
-        rollout_(rollout == "stepwise" ? &stepwise_rollout : &ops::rollout) {
+        rollout_(rollout == "stepwise" ? &stepwise_rollout : &ops::rollout),
+        particles_(observation.particles),
+        points_(observation.points()) {
     const std::vector<double> mass = observed_mass(observation);
     mass_.assign(mass.begin(), mass.end());
     volume_.assign(observation.volume.begin(), observation.volume.end());
-    start_.assign(observation.x.begin(), observation.x.begin() + 3 * observation.particles);
-    const std::int64_t P = observation.particles;
+    start_ = observation.start();
+    start_.insert(start_.end(), observation.tracers.begin(), observation.tracers.end());
+    mass_.resize(start_.size() / 3, T(0));
+    volume_.resize(start_.size() / 3, T(0));
     const torch::Dtype dtype = torch::CppTypeToScalarType<T>::value;
-    x0_ = torch::tensor(start_, dtype).view({P, 3});
+    x0_ = torch::tensor(start_, torch::kFloat64).to(dtype).view({-1, 3});
     mass_tensor_ = torch::tensor(mass_, dtype);
     volume_tensor_ = torch::tensor(volume_, dtype);
-    seen_ = torch::tensor(observation.x, torch::kFloat64).view({-1, 3 * P});
+    seen_ = torch::tensor(observation.x, torch::kFloat64).view({-1, 3 * points_});
+    const Tensor hidden = seen_.isnan();
+    const std::int64_t count = seen_.numel() - hidden.sum().item<std::int64_t>();
+    if (count < seen_.numel()) hidden_ = hidden;
+    per_frame_ = static_cast<double>(count) / static_cast<double>(observation.frames);
     std::vector<std::int64_t> states;  // among those that the roll-out hands out
     for (const std::ptrdiff_t step : steps.step) states.push_back(step / steps.stride);
     states_ = torch::tensor(states);
+    fraction_ = torch::tensor(steps.fraction, torch::kFloat64).view({-1, 1});
+    between_ = std::any_of(steps.fraction.begin(), steps.fraction.end(),
+                           [](double share) { return share > 0; });
   }
 
   Tensor mse(const ops::RolloutBody& body, const Tensor& v0, std::ptrdiff_t frames) const override {
     // First within the frames: sums of rows have one order on any number of threads.
-    return residuals(body, v0, frames).square().mean(1).mean();
+    const Tensor square = residuals(body, v0, frames).square();
+    if (!hidden_.defined()) return square.mean(1).mean();
+    return square.sum(1).mean() / per_frame_;
   }
 
   Tensor residuals(const ops::RolloutBody& body, const Tensor& v0,
@@ -51,23 +68,35 @@ class RolloutObjective : public MotionObjective {
     settings.grid = grid_;
     settings.steps = steps_.last(frames);
     settings.every = steps_.stride;
-    Tensor x = rollout_(x0_, v0.to(x0_.dtype()), {}, {}, mass_tensor_, volume_tensor_, {body},
-                        settings, {})
-                   .x;
-    if (x.size(0) != frames) x = x.index_select(0, states_.slice(0, 0, frames));
-    return x.flatten(1).to(torch::kFloat64) - seen_.slice(0, 0, frames);
+    std::vector<ops::RolloutBody> bodies{body};
+    const std::int64_t all = x0_.size(0);
+    if (all > particles_) {
+      ops::RolloutBody& tracers = bodies.emplace_back();
+      tracers.begin = particles_;
+      tracers.end = all;
+      tracers.tracers = true;
+    }
+    const Tensor states = rollout_(x0_, v0.to(x0_.dtype()), {}, {}, mass_tensor_, volume_tensor_,
+                                   bodies, settings, {})
+                              .x.slice(1, all - points_, all)
+                              .flatten(1)
+                              .to(torch::kFloat64);
+    const Tensor r = at_frames(states, frames) - seen_.slice(0, 0, frames);
+    return hidden_.defined() ? r.masked_fill(hidden_.slice(0, 0, frames), 0) : r;
   }
+
+  double seen_per_frame() const override { return per_frame_; }
 
   std::vector<double> frame_mse(const kernels::LawDescription& law, const RigidMotion& motion,
                                 std::ptrdiff_t frames) const override {
     std::vector<double> result(frames, kInfinity);
-    std::ptrdiff_t frame = 0;
     try {
-      run(law, motion, frames, [&](const std::vector<T>& x) {
-        const double mse = frame_error(x, frame);
-        if (std::isfinite(mse)) result[frame] = mse;
-        ++frame;
-      });
+      const kernels::Rollout<T> rollout = rollout_of(law);
+      visit_frames(rollout, initial(motion), steps_, frames,
+                   [&](std::ptrdiff_t frame, const std::vector<T>& x) {
+                     const double mse = frame_error(points_of(x), frame);
+                     if (std::isfinite(mse)) result[frame] = mse;
+                   });
     } catch (const Error&) {  // left the grid: the later frames stay infinite
     }
     return result;
@@ -76,52 +105,109 @@ class RolloutObjective : public MotionObjective {
   void simulate(const kernels::LawDescription& law, const RigidMotion& motion,
                 const std::function<void(std::ptrdiff_t, const std::vector<double>&)>& on_frame)
       const override {
-    std::ptrdiff_t frame = 0;
-    run(law, motion, observation_.frames, [&](const std::vector<T>& x) {
-      on_frame(frame++, std::vector<double>(x.begin(), x.end()));
-    });
+    const kernels::Rollout<T> rollout = rollout_of(law);
+    visit_frames(rollout, initial(motion), steps_, observation_.frames,
+                 [&](std::ptrdiff_t frame, const std::vector<T>& x) {
+                   on_frame(frame, std::vector<double>(points_of(x), x.data() + x.size()));
+                 });
+  }
+
+  Tensor flow_gradients(const kernels::LawDescription& law, const RigidMotion& motion,
+                        std::ptrdiff_t frames) const override {
+    // Of points that are particles, too, tracers tell: the F of a particle is what its law leaves.
+    std::vector<double> start(start_.begin(), start_.begin() + 3 * particles_);
+    start.insert(start.end(), start_.end() - 3 * points_, start_.end());
+    std::vector<T> mass(mass_.begin(), mass_.begin() + particles_);
+    std::vector<T> volume(volume_.begin(), volume_.begin() + particles_);
+    mass.resize(start.size() / 3, T(0));
+    volume.resize(start.size() / 3, T(0));
+    const kernels::Rollout<T> rollout(
+        grid_,
+        {{0, particles_, kernels::make_law<T>(law)},
+         {particles_, particles_ + points_, std::make_shared<const kernels::Tracer<T>>()}},
+        mass, volume);
+    const std::vector<double> v = motion.velocities(start);
+    const auto state =
+        kernels::ParticleState<T>::undeformed({start.begin(), start.end()}, {v.begin(), v.end()});
+    return torch::tensor(gradients(rollout, state, frames, particles_, particles_ + points_),
+                         torch::kFloat64)
+        .view({frames, points_, 3, 3});
+  }
+
+  std::vector<double> deformations(const kernels::LawDescription& law, const RigidMotion& motion,
+                                   std::ptrdiff_t frames) const override {
+    return gradients(rollout_of(law), initial(motion), frames, 0, particles_);
   }
 
  private:
-  template <class Visit>
-  void run(const kernels::LawDescription& law, const RigidMotion& motion, std::ptrdiff_t frames,
-           const Visit& visit) const {
-    const kernels::Rollout<T> rollout(
-        grid_, {{0, observation_.particles, kernels::make_law<T>(law)}}, mass_, volume_);
-    const std::vector<double> v =
-        motion.velocities({observation_.x.begin(), observation_.x.begin() + start_.size()});
-    auto state = kernels::ParticleState<T>::undeformed(start_, {v.begin(), v.end()});
-    std::ptrdiff_t next = 0;
+  kernels::Rollout<T> rollout_of(const kernels::LawDescription& law) const {
+    std::vector<kernels::BodyRange<T>> bodies{{0, particles_, kernels::make_law<T>(law)}};
+    const auto all = static_cast<std::ptrdiff_t>(mass_.size());
+    if (all > particles_)
+      bodies.push_back({particles_, all, std::make_shared<const kernels::Tracer<T>>()});
+    return {grid_, bodies, mass_, volume_};
+  }
+
+  /// F of the particles [begin, end) at the first frames; within a step it hardly changes.
+  std::vector<double> gradients(const kernels::Rollout<T>& rollout, kernels::ParticleState<T> state,
+                                std::ptrdiff_t frames, std::int64_t begin, std::int64_t end) const {
+    std::vector<double> F;
     kernels::RunOptions<T> options;
     options.every = steps_.stride;
+    options.frame_F = true;
+    std::ptrdiff_t next = 0;
     options.on_frame = [&](std::ptrdiff_t step, const kernels::ParticleState<T>& at) {
-      if (next < frames && step == steps_.step[next]) {
-        visit(at.x);
-        ++next;
-      }
+      for (; next < frames && steps_.step[next] == step; ++next)
+        F.insert(F.end(), at.F.begin() + 9 * begin, at.F.begin() + 9 * end);
       return next < frames;
     };
     rollout.run(state, steps_.last(frames), options);
+    return F;
   }
 
-  double frame_error(const std::vector<T>& x, std::ptrdiff_t frame) const {
+  kernels::ParticleState<T> initial(const RigidMotion& motion) const {
+    const std::vector<double> v = motion.velocities(start_);
+    return kernels::ParticleState<T>::undeformed({start_.begin(), start_.end()},
+                                                 {v.begin(), v.end()});
+  }
+
+  /// Where the points begin in the positions of all that is rolled out.
+  const T* points_of(const std::vector<T>& x) const { return x.data() + x.size() - 3 * points_; }
+
+  /// Frames from states: one of them, or between it and the next one.
+  Tensor at_frames(const Tensor& states, std::ptrdiff_t frames) const {
+    if (!between_ && states.size(0) == frames) return states;
+    const Tensor rows = states_.slice(0, 0, frames);
+    const Tensor x = states.index_select(0, rows);
+    if (!between_) return x;
+    const Tensor share = fraction_.slice(0, 0, frames);
+    const Tensor next = states.index_select(0, (rows + 1).clamp_max(states.size(0) - 1));
+    return x + share * (next - x);
+  }
+
+  double frame_error(const T* x, std::ptrdiff_t frame) const {
     const double* seen = observation_.positions(frame);
     double sum = 0;
-    for (std::size_t k = 0; k < x.size(); ++k) {
+    for (std::ptrdiff_t k = 0; k < 3 * points_; ++k) {
       const double d = static_cast<double>(x[k]) - seen[k];
-      sum += d * d;
+      if (!std::isnan(seen[k])) sum += d * d;
     }
-    return sum / static_cast<double>(x.size());
+    return sum / per_frame_;
   }
 
   const Observation& observation_;
   ObservedSteps steps_;
   kernels::GridSettings grid_;
   decltype(&ops::rollout) rollout_;
-  std::vector<T> mass_, volume_, start_;
+  std::int64_t particles_, points_;
+  std::vector<T> mass_, volume_;             // of particles and tracers
+  std::vector<double> start_;                // likewise
   Tensor x0_, mass_tensor_, volume_tensor_;  // the same, in T
-  Tensor seen_;                              // [frames, 3 particles], float64
-  Tensor states_;                            // [frames]
+  Tensor seen_;                              // [frames, 3 points], float64
+  Tensor hidden_;                            // likewise; undefined: nothing is
+  double per_frame_;
+  Tensor states_, fraction_;  // [frames], [frames, 1]
+  bool between_ = false;
 };
 
 /// LibTorch chooses the number of OpenMP threads anew when a thread first asks for it. It is asked

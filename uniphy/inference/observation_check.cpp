@@ -38,35 +38,50 @@ Map<const Vector3d> at(const Observation& o, std::ptrdiff_t frame, std::int64_t 
 bool out_of_reach(const Observation& o, const kernels::GridSettings& grid, std::ptrdiff_t frame) {
   const double low = grid.bound + 0.5, high = grid.n - grid.bound - 0.5;  // in cells
   const double* x = o.positions(frame);
-  return std::all_of(x, x + 3 * o.particles,
-                     [&](double c) { return c * grid.n >= low && c * grid.n < high; });
+  return std::all_of(x, x + 3 * o.points(), [&](double c) {
+    return std::isnan(c) || (c * grid.n >= low && c * grid.n < high);
+  });
 }
 
-/// Root of the mean square, over particles and coordinates, of what the best rotation and
-/// translation leave between the first frame and another. W. Kabsch, Acta Cryst. A32 (1976).
+/// Root of the mean square, over the points that both show and coordinates, of what the best
+/// rotation and translation leave between the first frame and another. W. Kabsch, Acta Cryst. A32
+/// (1976). Particles count by their volume.
 double rigid_residual(const Observation& o, std::ptrdiff_t frame) {
-  const Vector3d from = centre_of_mass(o, 0), to = centre_of_mass(o, frame);
-  Matrix3d moment = Matrix3d::Zero();
-  for (std::int64_t p = 0; p < o.particles; ++p) {
-    moment += o.volume[p] * (at(o, frame, p) - to) * (at(o, 0, p) - from).transpose();
+  std::vector<std::int64_t> both;
+  for (std::int64_t p = 0; p < o.points(); ++p) {
+    if (o.is_seen(0, p) && o.is_seen(frame, p)) both.push_back(p);
   }
+  if (both.empty()) return 0;
+  const auto weight = [&](std::int64_t p) { return o.tracked() ? 1.0 : o.volume[p]; };
+  Vector3d from = Vector3d::Zero(), to = Vector3d::Zero();
+  double total = 0;
+  for (const std::int64_t p : both) {
+    from += weight(p) * at(o, 0, p);
+    to += weight(p) * at(o, frame, p);
+    total += weight(p);
+  }
+  from /= total;
+  to /= total;
+  Matrix3d moment = Matrix3d::Zero();
+  for (const std::int64_t p : both)
+    moment += weight(p) * (at(o, frame, p) - to) * (at(o, 0, p) - from).transpose();
   const Eigen::JacobiSVD<Matrix3d> svd(moment, Eigen::ComputeFullU | Eigen::ComputeFullV);
   Matrix3d flip = Matrix3d::Identity();
   flip(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
   const Matrix3d R = svd.matrixU() * flip * svd.matrixV().transpose();
-  double sum = 0, total = 0;
-  for (std::int64_t p = 0; p < o.particles; ++p) {
-    sum += o.volume[p] * (at(o, frame, p) - to - R * (at(o, 0, p) - from)).squaredNorm();
-    total += o.volume[p];
-  }
+  double sum = 0;
+  for (const std::int64_t p : both)
+    sum += weight(p) * (at(o, frame, p) - to - R * (at(o, 0, p) - from)).squaredNorm();
   return std::sqrt(sum / (3 * total));
 }
 
 /// Σ m |ω × (x − centre)|² / Σ m at the first frame.
 double square_of_turning(const Observation& o, const RigidMotion& motion) {
+  const std::vector<double> start = o.start();
   double sum = 0, total = 0;
   for (std::int64_t p = 0; p < o.particles; ++p) {
-    sum += o.volume[p] * motion.angular.cross(at(o, 0, p) - motion.centre).squaredNorm();
+    const Map<const Vector3d> x(start.data() + 3 * p);
+    sum += o.volume[p] * motion.angular.cross(x - motion.centre).squaredNorm();
     total += o.volume[p];
   }
   return sum / total;
@@ -139,7 +154,7 @@ ObservationCheck check_observation(const Observation& observation, const Observe
   check.size = observed_size(observation);
   check.noise = observed_noise(observation);
   check_start(observation, steps, grid, motion, check);
-  check_energy(observation, grid, motion, check);
+  if (is_complete(observation)) check_energy(observation, grid, motion, check);
   return check;
 }
 

@@ -3,13 +3,17 @@
 #include <fmt/format.h>
 
 #include <Eigen/Cholesky>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <memory>
 #include <numeric>
 
 #include "ops/kernels/base/error.hpp"
+#include "ops/kernels/laws/tracer.hpp"
 #include "ops/kernels/rollout/rollout.hpp"
+#include "uniphy/inference/observed_frames.hpp"
 #include "uniphy/inference/observed_noise.hpp"
 #include "uniphy/scene/memory_check.hpp"
 
@@ -22,25 +26,71 @@ using Eigen::Vector3d;
 constexpr std::int64_t kMaximumSteps = 10000000;  ///< of an observation
 constexpr double kContactCells = 0.01;  ///< off the free flight, in cells, where a wall acts
 
-/// Where gravity alone takes a point within `steps` steps: the time stepping is symplectic.
-Vector3d fall(const kernels::GridSettings& grid, std::ptrdiff_t steps) {
-  const double k = static_cast<double>(steps);
-  return 0.5 * k * (k + 1) * grid.dt * grid.dt * Map<const Vector3d>(grid.gravity);
+/// Noise over size below which one frame tells the velocity: it would be off by less than a
+/// thousandth of a size a frame.
+constexpr double kLittleNoise = 1e-4;
+
+/// Time of a frame in steps.
+double steps_to(const ObservedSteps& steps, std::ptrdiff_t frame) {
+  return static_cast<double>(steps.step[frame]) + steps.fraction[frame];
 }
 
-/// Positions at the first `frames` frames after the start, of a body without stress.
-std::vector<double> fly(const kernels::Rollout<double>& rollout, const Observation& observation,
-                        const ObservedSteps& steps, int frames, const RigidMotion& motion) {
-  const std::vector<double> x(observation.x.begin(),
-                              observation.x.begin() + 3 * observation.particles);
-  auto state = kernels::ParticleState<double>::undeformed(x, motion.velocities(x));
-  std::vector<double> result;
-  for (int f = 1; f <= frames; ++f) {
-    rollout.run(state, steps.step[f] - steps.step[f - 1]);
-    result.insert(result.end(), state.x.begin(), state.x.end());
-  }
-  return result;
+/// Where gravity alone takes a point by a frame: the time stepping is symplectic.
+Vector3d fall(const kernels::GridSettings& grid, const ObservedSteps& steps, std::ptrdiff_t frame) {
+  const double k = static_cast<double>(steps.step[frame]), share = steps.fraction[frame];
+  const double whole = 0.5 * k * (k + 1) + share * (k + 1);
+  return whole * grid.dt * grid.dt * Map<const Vector3d>(grid.gravity);
 }
+
+/// Free flight of the body without stress, as the simulation has it.
+class Flight {
+ public:
+  Flight(const Observation& observation, const ObservedSteps& steps,
+         const kernels::GridSettings& grid, int frames)
+      : steps_(steps),
+        frames_(frames),
+        first_(observation.tracked() ? 3 * observation.particles : 0),
+        start_(observation.start()),
+        rollout_(make(observation, grid)) {
+    start_.insert(start_.end(), observation.tracers.begin(), observation.tracers.end());
+    // A point that is hidden at the first frame does not count; it stands with the first particle.
+    for (std::size_t k = 0; k < start_.size(); ++k) {
+      if (std::isnan(start_[k])) start_[k] = start_[k % 3];
+    }
+  }
+
+  /// Positions of the points [frames, points, 3] at the frames after the first one.
+  std::vector<double> fly(const RigidMotion& motion) const {
+    std::vector<double> result;
+    visit_frames(rollout_,
+                 kernels::ParticleState<double>::undeformed(start_, motion.velocities(start_)),
+                 steps_, frames_ + 1, [&](std::ptrdiff_t frame, const std::vector<double>& x) {
+                   if (frame > 0) result.insert(result.end(), x.begin() + first_, x.end());
+                 });
+    return result;
+  }
+
+ private:
+  static kernels::Rollout<double> make(const Observation& observation,
+                                       const kernels::GridSettings& grid) {
+    kernels::LawDescription limp;  // as good as no stress: moduli of 1e-3 Pa
+    limp.mu = limp.lambda = 1e-3;
+    const std::ptrdiff_t P = observation.particles,
+                         Q = observation.tracked() ? observation.points() : 0;
+    std::vector<kernels::BodyRange<double>> bodies{{0, P, kernels::make_law<double>(limp)}};
+    std::vector<double> mass = observed_mass(observation), volume = observation.volume;
+    if (Q > 0) bodies.push_back({P, P + Q, std::make_shared<const kernels::Tracer<double>>()});
+    mass.resize(P + Q, 0.0);
+    volume.resize(P + Q, 0.0);
+    return {grid, bodies, mass, volume};
+  }
+
+  const ObservedSteps& steps_;
+  int frames_;
+  std::ptrdiff_t first_;  ///< number of the points' first coordinate
+  std::vector<double> start_;
+  kernels::Rollout<double> rollout_;
+};
 
 /// True where one free flight, its start fitted to all frames, explains the path of the centre of
 /// mass: to 1 % of a cell, or, up to 10 %, but for what is no more than the noise of the particles
@@ -51,8 +101,8 @@ bool flies_freely(const Observation& observation, const ObservedSteps& steps,
   Eigen::Matrix<double, Eigen::Dynamic, 2> basis(frames, 2);
   Eigen::Matrix<double, Eigen::Dynamic, 3> path(frames, 3);
   for (Eigen::Index f = 0; f < frames; ++f) {
-    basis.row(f) << 1, static_cast<double>(steps.step[f]) / static_cast<double>(steps.step.back());
-    path.row(f) = centre_of_mass(observation, f) - fall(grid, steps.step[f]);
+    basis.row(f) << 1, steps_to(steps, f) / steps_to(steps, frames - 1);
+    path.row(f) = centre_of_mass(observation, f) - fall(grid, steps, f);
   }
   const Eigen::Matrix<double, 2, 3> start =
       (basis.transpose() * basis).ldlt().solve(basis.transpose() * path);
@@ -66,10 +116,7 @@ bool flies_freely(const Observation& observation, const ObservedSteps& steps,
          largest <= 5 * observed_noise(observation);
 }
 
-}  // namespace
-
-Vector3d centre_of_mass(const Observation& observation, std::ptrdiff_t frame) {
-  const double* x = observation.positions(frame);
+Vector3d centre_of(const Observation& observation, const double* x) {
   Vector3d sum = Vector3d::Zero();
   double total = 0;
   for (std::int64_t p = 0; p < observation.particles; ++p) {
@@ -77,6 +124,75 @@ Vector3d centre_of_mass(const Observation& observation, std::ptrdiff_t frame) {
     total += observation.volume[p];
   }
   return sum / total;
+}
+
+/// Whether the body, moving on as a rigid one, reads a node that a wall stops at the frame.
+bool reaches_wall(const Observation& observation, const ObservedSteps& steps,
+                  const kernels::GridSettings& grid, const RigidMotion& motion,
+                  std::ptrdiff_t frame) {
+  const double t = steps_to(steps, frame) * grid.dt, speed = motion.angular.norm();
+  const Vector3d axis = speed > 0 ? Vector3d(motion.angular / speed) : Vector3d::UnitX();
+  const Eigen::Matrix3d R = Eigen::AngleAxisd(speed * t, axis).toRotationMatrix();
+  const Vector3d centre = motion.centre + t * motion.linear + fall(grid, steps, frame);
+  const double low = grid.bound + 0.5, high = grid.n - grid.bound - 0.5;  // in cells
+  const std::vector<double> start = observation.start();
+  for (std::int64_t p = 0; p < observation.particles; ++p) {
+    const Vector3d x =
+        grid.n * (centre + R * (Map<const Vector3d>(start.data() + 3 * p) - motion.centre));
+    if (!((x.array() >= low).all() && (x.array() < high).all())) return true;
+  }
+  return false;
+}
+
+/// Gauss–Newton on the positions of the points: linear and angular velocity, or the latter alone.
+void fit_motion(const Observation& observation, const Flight& flight, bool linear, int frames,
+                RigidMotion& motion) {
+  const double* seen = observation.positions(1);
+  const auto numbers = static_cast<std::size_t>(3 * frames * observation.points());
+  const auto counts = [&](std::size_t k) {
+    return !std::isnan(seen[k]) &&
+           !(observation.tracked() &&
+             std::isnan(observation.tracers[k % observation.tracers.size()]));
+  };
+  const int first = linear ? 0 : 3;
+  for (int iteration = 0; iteration < 3; ++iteration) {
+    const std::vector<double> flown = flight.fly(motion);
+    std::vector<std::vector<double>> moved;
+    for (int k = first; k < 6; ++k) {
+      RigidMotion other = motion;  // the response is linear but for the motion of the particles
+      (k < 3 ? other.linear[k] : other.angular[k - 3]) += 1;
+      moved.push_back(flight.fly(other));
+    }
+    const auto size = static_cast<Eigen::Index>(moved.size());
+    Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(size, size);
+    Eigen::VectorXd right = Eigen::VectorXd::Zero(size), slope(size);
+    for (std::size_t k = 0; k < numbers; ++k) {
+      if (!counts(k)) continue;
+      for (Eigen::Index i = 0; i < size; ++i) slope[i] = moved[i][k] - flown[k];
+      normal += slope * slope.transpose();
+      right += slope * (seen[k] - flown[k]);
+    }
+    // A body that is a point or a line along an axis does not show its rotation about it.
+    normal.diagonal().array() += 1e-12 * normal.trace() + 1e-300;
+    const Eigen::VectorXd step = normal.ldlt().solve(right);
+    if (linear) motion.linear += step.head<3>();
+    motion.angular += step.tail<3>();
+  }
+}
+
+}  // namespace
+
+bool is_complete(const Observation& observation) {
+  return !observation.tracked() && std::none_of(observation.x.begin(), observation.x.end(),
+                                                [](double x) { return std::isnan(x); });
+}
+
+Vector3d centre_of_mass(const Observation& observation) {
+  return centre_of(observation, observation.start().data());
+}
+
+Vector3d centre_of_mass(const Observation& observation, std::ptrdiff_t frame) {
+  return centre_of(observation, observation.positions(frame));
 }
 
 ObservedSteps observed_steps(const Observation& observation, const std::string& name) {
@@ -88,19 +204,17 @@ ObservedSteps observed_steps(const Observation& observation, const std::string& 
                     "first frame to the last, found {:.0f}",
                     name, kMaximumSteps, all));
   }
+  constexpr double kWhole = 0.01;  // of a step: what a time is rounded by
   std::ptrdiff_t divisor = 0;
-  for (std::size_t f = 0; f < observation.time.size(); ++f) {
-    const double steps = (observation.time[f] - observation.time[0]) / observation.dt;
-    const double whole = std::round(steps);
-    if (std::abs(steps - whole) > 0.01 || (f > 0 && whole < 1)) {
-      throw Error(fmt::format(
-          "{}: /time: expected frames at whole multiples of dt = {} s, found {} s at frame {}",
-          name, observation.dt, observation.time[f], f));
-    }
-    result.step.push_back(static_cast<std::ptrdiff_t>(whole));
+  for (const double time : observation.time) {
+    const double steps = (time - observation.time[0]) / observation.dt, whole = std::round(steps);
+    const bool between = std::abs(steps - whole) > kWhole;
+    result.step.push_back(static_cast<std::ptrdiff_t>(between ? std::floor(steps) : whole));
+    result.fraction.push_back(between ? steps - std::floor(steps) : 0);
     divisor = std::gcd(divisor, result.step.back());
+    if (between) divisor = std::gcd(divisor, result.step.back() + 1);
   }
-  result.stride = divisor;
+  result.stride = std::max<std::ptrdiff_t>(divisor, 1);
   return result;
 }
 
@@ -130,14 +244,15 @@ Observation first_frames(const Observation& observation, std::ptrdiff_t frames) 
   Observation part = observation;
   part.frames = frames;
   part.time.resize(static_cast<std::size_t>(frames));
-  part.x.resize(static_cast<std::size_t>(3 * frames * observation.particles));
+  part.x.resize(static_cast<std::size_t>(3 * frames * observation.points()));
   return part;
 }
 
 double observed_size(const Observation& observation) {
-  Vector3d low = Map<const Vector3d>(observation.positions(0)), high = low;
+  const std::vector<double> start = observation.start();
+  Vector3d low = Map<const Vector3d>(start.data()), high = low;
   for (std::int64_t p = 1; p < observation.particles; ++p) {
-    const auto x = Map<const Vector3d>(observation.positions(0) + 3 * p);
+    const auto x = Map<const Vector3d>(start.data() + 3 * p);
     low = low.cwiseMin(x);
     high = high.cwiseMax(x);
   }
@@ -147,51 +262,51 @@ double observed_size(const Observation& observation) {
 RigidMotion observed_motion(const Observation& observation, const ObservedSteps& steps,
                             const kernels::GridSettings& grid, int frames) {
   frames = static_cast<int>(std::min<std::int64_t>(frames, observation.frames - 1));
+  const bool complete = is_complete(observation);
   RigidMotion motion;
-  motion.centre = centre_of_mass(observation, 0);
-  Vector3d moment = Vector3d::Zero();
-  double weight = 0;
-  for (int f = 1; f <= frames; ++f) {
-    const double t = static_cast<double>(steps.step[f]) * grid.dt;
-    moment += t * (centre_of_mass(observation, f) - motion.centre - fall(grid, steps.step[f]));
-    weight += t * t;
+  motion.centre = centre_of_mass(observation);
+  if (complete) {
+    Vector3d moment = Vector3d::Zero();
+    double weight = 0;
+    for (int f = 1; f <= frames; ++f) {
+      const double t = steps_to(steps, f) * grid.dt;
+      moment += t * (centre_of_mass(observation, f) - motion.centre - fall(grid, steps, f));
+      weight += t * t;
+    }
+    motion.linear = moment / weight;
   }
-  motion.linear = moment / weight;
+  fit_motion(observation, Flight(observation, steps, grid, frames), !complete, frames, motion);
+  return motion;
+}
 
-  kernels::LawDescription limp;  // as good as no stress: moduli of 1e-3 Pa
-  limp.mu = limp.lambda = 1e-3;
-  const kernels::Rollout<double> rollout(
-      grid, {{0, observation.particles, kernels::make_law<double>(limp)}},
-      observed_mass(observation), observation.volume);
-  const double* seen = observation.positions(1);
-  for (int iteration = 0; iteration < 3; ++iteration) {
-    const std::vector<double> flown = fly(rollout, observation, steps, frames, motion);
-    Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-    Vector3d right = Vector3d::Zero();
-    Eigen::Matrix<double, Eigen::Dynamic, 3> slope(static_cast<Eigen::Index>(flown.size()), 3);
-    for (int axis = 0; axis < 3; ++axis) {
-      RigidMotion turned = motion;
-      turned.angular[axis] += 1;  // the response is linear but for the motion of the particles
-      const std::vector<double> moved = fly(rollout, observation, steps, frames, turned);
-      for (std::size_t k = 0; k < flown.size(); ++k) slope(k, axis) = moved[k] - flown[k];
+RigidMotion observed_motion(const Observation& observation, const ObservedSteps& steps,
+                            const kernels::GridSettings& grid) {
+  RigidMotion motion = observed_motion(observation, steps, grid, 1);
+  if (observed_noise(observation) <= kLittleNoise * observed_size(observation)) return motion;
+  // Noise may show as a fast rotation: look again with the better motion.
+  for (int frames = 1, before = 0; frames > before;) {
+    before = frames;
+    while (frames + 1 < observation.frames &&
+           steps_to(steps, frames + 1) * grid.dt * motion.angular.norm() < kFlightAngle &&
+           !reaches_wall(observation, steps, grid, motion, frames + 1)) {
+      ++frames;
     }
-    for (std::size_t k = 0; k < flown.size(); ++k) {
-      normal += slope.row(k).transpose() * slope.row(k);
-      right += slope.row(k).transpose() * (seen[k] - flown[k]);
-    }
-    // A body that is a point or a line along an axis does not show its rotation about it.
-    normal.diagonal().array() += 1e-12 * normal.trace() + 1e-300;
-    motion.angular += normal.ldlt().solve(right);
+    if (frames > before) motion = observed_motion(observation, steps, grid, frames);
   }
   return motion;
 }
 
 std::ptrdiff_t first_contact(const Observation& observation, const ObservedSteps& steps,
                              const kernels::GridSettings& grid, const RigidMotion& motion) {
-  if (flies_freely(observation, steps, grid)) return observation.frames;
+  const bool complete = is_complete(observation);
+  if (complete && flies_freely(observation, steps, grid)) return observation.frames;
   for (std::ptrdiff_t f = 1; f < observation.frames; ++f) {
-    const double t = static_cast<double>(steps.step[f]) * grid.dt;
-    const Vector3d free = motion.centre + t * motion.linear + fall(grid, steps.step[f]);
+    if (!complete) {
+      if (reaches_wall(observation, steps, grid, motion, f)) return f;
+      continue;
+    }
+    const double t = steps_to(steps, f) * grid.dt;
+    const Vector3d free = motion.centre + t * motion.linear + fall(grid, steps, f);
     if ((centre_of_mass(observation, f) - free).norm() > kContactCells * grid.dx()) return f;
   }
   return observation.frames;

@@ -9,15 +9,20 @@
 
 namespace uniphy {
 
-/// The frames of an observation as states of a simulation.
+/// The frames of an observation in steps of a simulation.
 struct ObservedSteps {
-  std::vector<std::ptrdiff_t> step;  ///< [frames] MPM steps from the first frame, which is 0
-  std::ptrdiff_t stride = 1;         ///< largest number that divides all of them
+  std::vector<std::ptrdiff_t> step;  ///< [frames] whole MPM steps from the first frame, which is 0
+  std::vector<double> fraction;      ///< [frames] of a step after that, [0, 1)
+  std::ptrdiff_t stride = 1;  ///< largest number that divides all steps that a frame is taken from
 
-  std::ptrdiff_t last(std::ptrdiff_t frames) const { return step[frames - 1]; }
+  /// The step at which all of the first `frames` are known.
+  std::ptrdiff_t last(std::ptrdiff_t frames) const {
+    return step[frames - 1] + (fraction[frames - 1] > 0 ? 1 : 0);
+  }
 };
 
-/// Throws Error, starting with `name`, where a time is not a multiple of dt to 1 % of dt.
+/// A time within 1 % of dt of a whole step counts as one. Throws Error, starting with `name`, where
+/// the frames span too many steps.
 ObservedSteps observed_steps(const Observation& observation, const std::string& name);
 
 /// The grid, walls, gravity and dt of the observation. Throws Error where they make no sense.
@@ -26,7 +31,12 @@ kernels::GridSettings observed_grid(const Observation& observation, const std::s
 /// kg of each particle: density × volume.
 std::vector<double> observed_mass(const Observation& observation);
 
-/// Of the particles at a frame, m.
+/// Whether the points are the particles and all of them are seen in every frame.
+bool is_complete(const Observation& observation);
+
+/// Of the body at the first frame, m.
+Eigen::Vector3d centre_of_mass(const Observation& observation);
+/// Of a complete observation at a frame, m.
 Eigen::Vector3d centre_of_mass(const Observation& observation, std::ptrdiff_t frame);
 
 /// The first `frames` of an observation.
@@ -37,18 +47,28 @@ double observed_size(const Observation& observation);
 
 /// The velocity of the body at the first frame, from observed positions alone. The body is taken to
 /// fly freely and to move as a rigid one at the first frame; `frames` frames after it are used:
-/// - linear: the centre of mass moves as x₀ + k Δt v + ½ k (k+1) Δt² g whatever the material,
-///   because internal forces cancel; least squares over the frames.
-/// - angular: Gauss–Newton on the positions that the simulation itself gives without stress, since
-///   the first transfer to the grid and back (C = 0) takes away a part of the rotation that depends
-///   on grid and shape. Stress moves particles by O(t²) along the radius only.
-/// Frames should be close: |ω| times the time they span ought to be small against 1.
+/// Gauss–Newton on the positions that the simulation itself gives without stress, since the first
+/// transfer to the grid and back (C = 0) takes away a part of the rotation that depends on grid and
+/// shape. Stress moves particles by O(t²) along the radius only. Of a complete observation the
+/// linear part follows from the centre of mass, which moves as x₀ + k Δt v + ½ k (k+1) Δt² g
+/// whatever the material, because internal forces cancel; least squares over the frames. Frames
+/// should be close: |ω| times the time they span ought to be small against 1.
 RigidMotion observed_motion(const Observation& observation, const ObservedSteps& steps,
                             const kernels::GridSettings& grid, int frames);
 
-/// The first frame at which the centre of mass has left the parabola of free flight by more than
-/// 1 % of a cell: a wall acts. The number of frames where that never happens, or where another
-/// parabola explains all frames (the motion of the first ones is noisy).
+/// The same from as many frames as the noise asks for: one where there is next to none, else those
+/// before the body reaches a wall and before it has turned by kFlightAngle.
+RigidMotion observed_motion(const Observation& observation, const ObservedSteps& steps,
+                            const kernels::GridSettings& grid);
+/// rad. The rotation of a body without stress, which the positions are compared with, is off by
+/// ½ kFlightAngle² of a radius at its end.
+inline constexpr double kFlightAngle = 0.2;
+
+/// The first frame at which a wall acts; the number of frames where that never happens. Of a
+/// complete observation it is where the centre of mass has left the parabola of free flight by more
+/// than 1 % of a cell, unless another parabola explains all frames (the motion of the first ones is
+/// noisy). Else it is where the body, flying on as a rigid one, is the first time so near a wall
+/// that it reads its nodes.
 std::ptrdiff_t first_contact(const Observation& observation, const ObservedSteps& steps,
                              const kernels::GridSettings& grid, const RigidMotion& motion);
 

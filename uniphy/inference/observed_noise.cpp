@@ -27,7 +27,7 @@ double path_noise(const std::vector<double>& time, const double* c, std::int64_t
     for (std::int64_t k = 0; k < 3 * points; k += stride) {
       double difference = 0;
       for (int i = 0; i < 4; ++i) difference += weight[i] * c[(f + i) * 3 * points + k];
-      seen.push_back(std::abs(difference) / std::sqrt(square));
+      if (!std::isnan(difference)) seen.push_back(std::abs(difference) / std::sqrt(square));
     }
   }
   constexpr double kMedianOfNormal = 0.6745;  // of |x| for a standard deviation of 1
@@ -35,7 +35,8 @@ double path_noise(const std::vector<double>& time, const double* c, std::int64_t
 }
 
 double observed_noise(const Observation& observation) {
-  return path_noise(observation.time, observation.x.data(), observation.particles);
+  if (!std::isnan(observation.noise)) return observation.noise;
+  return path_noise(observation.time, observation.x.data(), observation.points());
 }
 
 }  // namespace uniphy

@@ -27,26 +27,28 @@ class Stopwatch {
 
 /// Share of the loss that an iteration has to take away.
 constexpr double kLittleGain = 0.01;
+/// A gain that noise tells from none, in residuals of the mean size.
+constexpr double kGainOverNoise = 10;
 
 }  // namespace
 
 Tensor least_squares(const FitProblem& problem, const Tensor& start, const Pull& pull,
-                     std::ptrdiff_t frames, int iterations, RungTask& task,
-                     const AfterStep& after_step) {
+                     std::ptrdiff_t frames, int iterations, const StartCorrection* starts,
+                     RungTask& task, const AfterStep& after_step) {
   const Tensor leaf = start.detach().clone();
   LevenbergMarquardt optimizer({leaf}, LevenbergMarquardtOptions());
   if (task.steps > 0) optimizer.resume(task.optimizer);
   const auto residuals = [&](const Tensor& u) {
-    const Tensor r = problem.residuals(u, frames);
+    const Tensor r = problem.residuals(u, frames, starts);
     return r.defined() ? torch::cat({r, pull.weight * (u - pull.to)}) : r;
   };
   Stopwatch watch(task);
+  const double little = starts != nullptr ? kGainOverNoise / problem.seen(frames) : kLittleGain;
   while (!task.done) {
     const double before = optimizer.loss();
     const double loss = optimizer.step(residuals).item<double>();
     ++task.steps;
-    task.done =
-        optimizer.stuck() || task.steps >= iterations || !(loss < (1 - kLittleGain) * before);
+    task.done = optimizer.stuck() || task.steps >= iterations || !(loss < (1 - little) * before);
     task.roll_outs = optimizer.evaluations();
     task.optimizer = optimizer.saved();
     watch.look();

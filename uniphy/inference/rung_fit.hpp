@@ -8,6 +8,7 @@
 #include "uniphy/inference/descent.hpp"
 #include "uniphy/inference/fit_problem.hpp"
 #include "uniphy/inference/levenberg_marquardt.hpp"
+#include "uniphy/inference/start_correction.hpp"
 
 namespace uniphy {
 
@@ -22,11 +23,12 @@ struct Pull {
 };
 
 /// The point of a problem's first `frames` that at most `iterations` of LevenbergMarquardt lead to
-/// from `start`; it ends sooner where an iteration gains less than 1 % of the loss. Goes on where
-/// the task was left.
+/// from `start` (see FitProblem::residuals, also for `starts`); it ends sooner where an iteration
+/// gains less than 1 % of the loss, or, with `starts`, where noise is most of that, than ten
+/// residuals of the mean size. Goes on where the task was left.
 torch::Tensor least_squares(const FitProblem& problem, const torch::Tensor& start, const Pull& pull,
-                            std::ptrdiff_t frames, int iterations, RungTask& task,
-                            const AfterStep& after_step);
+                            std::ptrdiff_t frames, int iterations, const StartCorrection* starts,
+                            RungTask& task, const AfterStep& after_step);
 
 /// The lowest point of a Descent over all frames from `start`. Goes on where the task was left.
 torch::Tensor descend(const FitProblem& problem, const torch::Tensor& start,

@@ -7,6 +7,7 @@
 #include <limits>
 #include <optional>
 
+#include "ops/kernels/base/error.hpp"
 #include "uniphy/inference/observed_motion.hpp"
 #include "uniphy/report/progress.hpp"
 
@@ -19,13 +20,15 @@ RungFitter::RungFitter(const Observation& observation, const std::string& name,
                        const AdaptationOptions& adaptation, const FitHooks& hooks)
     : observation_(observation),
       name_(name),
+      latent_(latent),
       options_(options),
       adaptation_(adaptation),
       hooks_(hooks),
       state_(adaptation_state_file(hooks.state_file), hooks),
       size_(observed_size(observation)) {
+  if (!can_be_adapted(latent)) return;
   for (const Rung rung : {Rung::latent, Rung::numbers, Rung::weights}) {
-    variables_.push_back(std::make_unique<AdaptedVariables>(latent, rung));
+    adapted_.push_back(std::make_unique<AdaptedVariables>(latent, rung));
   }
 }
 
@@ -35,9 +38,12 @@ FitOptions RungFitter::rung_options(bool differences) const {
   if (differences) o.dtype = "float64";
   o.rollout = "fused";
   o.pull = adaptation_.pull;
-  o.refine_velocity = false;
   o.stages = {FitStage()};
   return o;
+}
+
+const FitVariables& RungFitter::of(Rung rung) const {
+  return rung == Rung::latent ? latent_ : variables(rung);
 }
 
 RungReport& RungFitter::report(Rung rung) {
@@ -71,13 +77,32 @@ Tensor RungFitter::work(Rung rung, const std::string& name, int steps, const Imp
 
 Tensor RungFitter::least_squares(const Observation& seen, std::ptrdiff_t frames, Rung rung,
                                  const Tensor& start, const Pull& pull, const std::string& task,
-                                 int iterations) {
+                                 int iterations, bool with_motion) {
   const FitOptions options = rung_options(true);
-  const FitProblem problem(seen, name_, variables(rung), options, &motion_);
-  const int roll_outs = iterations * (variables(rung).size() + LevenbergMarquardt::kTrials);
-  return work(rung, task, roll_outs, [&](RungTask& t, const AfterStep& after) {
-    return uniphy::least_squares(problem, start, pull, frames, iterations, t, after);
+  const FitVariables& variables = of(rung);
+  const FitProblem problem(seen, name_, variables, options, &motion_);
+  const Tensor still = torch::zeros({with_motion ? FitProblem::kMotion : 0}, torch::kFloat64);
+  const Tensor from = torch::cat({start, still});
+  std::optional<StartCorrection> starts;
+  try {
+    if (problem.fits_starts()) starts.emplace(problem.start_correction(from, frames));
+  } catch (const Error&) {  // the roll-out fails there, and its starts are left as they are
+  }
+  const int columns = static_cast<int>(from.numel());
+  const int roll_outs = iterations * (columns + LevenbergMarquardt::kTrials);
+  const Tensor point = work(rung, task, roll_outs, [&](RungTask& t, const AfterStep& after) {
+    return uniphy::least_squares(problem, from, {torch::cat({pull.to, still}), pull.weight}, frames,
+                                 iterations, starts ? &*starts : nullptr, t, after);
   });
+  if (with_motion) motion_ = problem.motion_at(point);
+  return point.slice(0, 0, variables.size()).clone();
+}
+
+Tensor RungFitter::start_shift(const Observation& seen, Rung rung, const Tensor& point) const {
+  const FitOptions options = rung_options(true);
+  const FitProblem problem(seen, name_, of(rung), options, &motion_);
+  return problem.start_correction(point, seen.frames)
+      .correction(problem.misses(point, seen.frames));
 }
 
 Tensor RungFitter::descend(const Observation& seen, const Tensor& start, const std::string& task,
@@ -93,12 +118,26 @@ Tensor RungFitter::descend(const Observation& seen, const Tensor& start, const s
 
 std::vector<double> RungFitter::roots(const Tensor& point, Rung rung, std::ptrdiff_t frames) const {
   const FitOptions options = rung_options(true);
-  const FitProblem whole(observation_, name_, variables(rung), options, &motion_);
+  const FitProblem whole(observation_, name_, of(rung), options, &motion_);
   FitCandidate candidate = whole.candidate(0);
   candidate.u = point;
   std::vector<double> root = whole.frame_mse(candidate, frames);
   for (double& r : root) r = std::sqrt(r) / size_;
   return root;
+}
+
+bool RungFitter::lasts(const Tensor& point, Rung rung) const {
+  Observation longer = first_frames(observation_, 2);
+  longer.time[1] = longer.time[0] + 2 * (observation_.time.back() - observation_.time[0]);
+  // What is compared does not matter; nothing is hidden, so that every frame counts.
+  const std::vector<double> points = longer.tracked() ? longer.tracers : longer.start();
+  longer.x = points;
+  longer.x.insert(longer.x.end(), points.begin(), points.end());
+  const FitOptions options = rung_options(true);
+  const FitProblem problem(longer, name_, of(rung), options, &motion_);
+  FitCandidate candidate = problem.candidate(0);
+  candidate.u = point;
+  return std::isfinite(problem.frame_mse(candidate, 2)[1]);
 }
 
 }  // namespace uniphy

@@ -20,17 +20,21 @@ class RungFitter {
   RungFitter(const Observation& observation, const std::string& name, const FitVariables& latent,
              const FitOptions& options, const AdaptationOptions& adaptation, const FitHooks& hooks);
 
-  const AdaptedVariables& variables(Rung rung) const { return *variables_[int(rung)]; }
+  /// Of a learned law.
+  const AdaptedVariables& variables(Rung rung) const { return *adapted_[int(rung)]; }
   double size() const { return size_; }
   AdaptationState& state() { return state_; }
   /// The initial velocity of all roll-outs from now on.
   void set_motion(const RigidMotion& motion) { motion_ = motion; }
-
+  const RigidMotion& motion() const { return motion_; }
   /// The point that least squares on the first `frames` of `seen`, the observation or its first
-  /// part, lead to. `task` is unique within the rung.
+  /// part, lead to; where asked for, with the initial velocity, which then is that of all
+  /// roll-outs. `task` is unique within the rung.
   torch::Tensor least_squares(const Observation& seen, std::ptrdiff_t frames, Rung rung,
                               const torch::Tensor& start, const Pull& pull, const std::string& task,
-                              int iterations);
+                              int iterations, bool with_motion);
+  /// δ [points, 3] of the starts of `seen` by the law at a point (StartCorrection::correction).
+  torch::Tensor start_shift(const Observation& seen, Rung rung, const torch::Tensor& point) const;
   /// The same of all weights, by at most `epochs` roll-outs with gradients over all frames.
   torch::Tensor descend(const Observation& seen, const torch::Tensor& start,
                         const std::string& task, int epochs);
@@ -38,24 +42,30 @@ class RungFitter {
   /// roll-out fails.
   std::vector<double> roots(const torch::Tensor& point, Rung rung, std::ptrdiff_t frames) const;
 
+  /// Whether the law of a point can be simulated for as long again as it was observed: one that
+  /// was adapted to a motion may fail right after it.
+  bool lasts(const torch::Tensor& point, Rung rung) const;
+
   /// The report of a rung, which is added where there is none.
   RungReport& report(Rung rung);
   const std::vector<RungReport>& reports() const { return reports_; }
 
  private:
   FitOptions rung_options(bool differences) const;
+  const FitVariables& of(Rung rung) const;
   template <class Improve>
   torch::Tensor work(Rung rung, const std::string& name, int steps, const Improve& improve);
 
   const Observation& observation_;
   const std::string& name_;
+  const FitVariables& latent_;
   const FitOptions& options_;
   const AdaptationOptions& adaptation_;
   const FitHooks& hooks_;
   AdaptationState state_;
   double size_;
   RigidMotion motion_;
-  std::vector<std::unique_ptr<AdaptedVariables>> variables_;  ///< of each rung
+  std::vector<std::unique_ptr<AdaptedVariables>> adapted_;  ///< of each rung; empty: analytic
   std::vector<RungReport> reports_;
 };
 

@@ -58,6 +58,10 @@ ops::RolloutFrames stepwise_rollout(const Tensor& x0, const Tensor& v0, const Te
       body.networks = ops::to_networks(*body.law.weights, torch::kFloat64);
   }
   const kernels::GridSettings& grid = settings.grid;
+  // Tracers, the last bodies, only read the grid.
+  std::int64_t material = 0;
+  for (const ops::RolloutBody& body : bodies) material = body.tracers ? material : body.end;
+  const auto of_material = [material](const Tensor& t) { return t.slice(0, 0, material); };
   Tensor x = x0, v = v0;
   Tensor C = C0.defined() ? C0 : torch::zeros({x.size(0), 3, 3}, x.options());
   Tensor F = F0.defined() ? F0 : torch::eye(3, x.options()).repeat({x.size(0), 1, 1});
@@ -72,16 +76,22 @@ ops::RolloutFrames stepwise_rollout(const Tensor& x0, const Tensor& v0, const Te
       std::vector<Tensor> F_proj, tau;
       for (std::size_t b = 0; b < bodies.size(); ++b) {  // lines 7 to 12
         const ops::RolloutBody& body = bodies[b];
+        if (body.tracers) {
+          F_proj.push_back(F.slice(0, body.begin, body.end).detach());
+          continue;
+        }
         const auto own = [&body](const Tensor& t) { return t.slice(0, body.begin, body.end); };
         const ops::LawOutput law = law_of(body, own(F), own(C), grid.dt, &memories[b]);
         F_proj.push_back(law.F_proj);
         tau.push_back(law.tau);
       }
       F = torch::cat(F_proj);
-      const Tensor nodes = ops::p2g(x, v, C, torch::cat(tau), mass, volume, grid);  // line 5
-      const Tensor velocity = ops::grid_update(nodes, grid);                        // line 13
-      const ops::G2p particles = ops::g2p(x, velocity, grid);                       // line 14
-      x = particles.x;                                                              // line 15
+      const Tensor nodes = ops::p2g(of_material(x), of_material(v), of_material(C), torch::cat(tau),
+                                    of_material(mass), of_material(volume),
+                                    grid);                     // line 5
+      const Tensor velocity = ops::grid_update(nodes, grid);   // line 13
+      const ops::G2p particles = ops::g2p(x, velocity, grid);  // line 14
+      x = particles.x;                                         // line 15
       v = particles.v;
       C = particles.C;
       if ((step + 1) % settings.every != 0) continue;

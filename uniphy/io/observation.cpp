@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 
 #include "ops/kernels/base/error.hpp"
@@ -15,44 +16,96 @@ namespace {
 
 constexpr const char* kFormat = "uniphy-observation";
 
-/// What has to hold of an observation whether it is written or read; fail(object, message).
-template <class Fail>
-void check(const Observation& observation, const Fail& fail) {
-  if (observation.frames < 2 || observation.particles < 1) {
-    fail("/x", fmt::format("expected at least two frames of one particle, found {} of {}",
-                           observation.frames, observation.particles));
+/// `fail(object, message)` throws, naming the file.
+using Fail = std::function<void(const std::string& object, const std::string& message)>;
+
+void check_inside(const std::vector<double>& x, const char* object, const char* row, bool hidden,
+                  const Fail& fail) {
+  for (std::size_t k = 0; k < x.size(); ++k) {
+    if (x[k] >= 0 && x[k] <= 1) continue;
+    if (hidden && std::isnan(x[k])) continue;
+    fail(object, fmt::format("expected positions inside the unit cube, found {} m of {} {}", x[k],
+                             row, k / 3));
   }
-  for (std::size_t i = 1; i < observation.time.size(); ++i) {
-    if (observation.time[i] <= observation.time[i - 1]) {
-      fail("/time", fmt::format("expected increasing times, found {} s after {} s",
-                                observation.time[i], observation.time[i - 1]));
+}
+
+void check_points(const Observation& o, const Fail& fail) {
+  if (o.frames < 2 || o.points() < 1) {
+    fail("/x", fmt::format("expected at least two frames of one point, found {} of {}", o.frames,
+                           o.points()));
+  }
+  const std::int64_t numbers = 3 * o.frames * o.points();
+  if (static_cast<std::int64_t>(o.x.size()) != numbers) {
+    fail("/x", fmt::format("expected {} numbers for the shape [{}, {}, 3], found {}", numbers,
+                           o.frames, o.points(), o.x.size()));
+  }
+  for (std::size_t i = 1; i < o.time.size(); ++i) {
+    if (o.time[i] <= o.time[i - 1]) {
+      fail("/time", fmt::format("expected increasing times, found {} s after {} s", o.time[i],
+                                o.time[i - 1]));
     }
   }
+  const auto count = static_cast<std::size_t>(o.points());
+  for (std::size_t k = 0; k < o.x.size(); ++k) {
+    const std::size_t point = k / 3 % count, frame = k / 3 / count;
+    const auto at = [&] { return fmt::format("of point {} in frame {}", point, frame); };
+    if (std::isnan(o.x[k])) {
+      if (frame == 0 && !o.tracked()) {
+        fail("/x", "expected every particle in the first frame, found NaN " + at());
+      }
+      for (std::size_t c = k - k % 3; c < k - k % 3 + 3; ++c) {
+        if (!std::isnan(o.x[c])) {
+          fail("/x", "expected three coordinates, or NaN in all of them, found both " + at());
+        }
+      }
+    } else if (!(o.x[k] >= 0 && o.x[k] <= 1)) {
+      fail("/x",
+           fmt::format("expected positions inside the unit cube, found {} m {}", o.x[k], at()));
+    }
+  }
+  if (std::all_of(o.x.begin(), o.x.end(), [](double x) { return std::isnan(x); })) {
+    fail("/x", "expected positions, found NaN alone");
+  }
+  if (!std::isnan(o.noise) && !(o.noise >= 0 && o.noise < 1)) {
+    fail("attribute noise of /x", fmt::format("expected 0 to 1 m, found {}", o.noise));
+  }
+}
+
+void check_surface(const Observation& o, const Fail& fail) {
+  check_inside(o.vertices, "/body/vertices", "vertex", false, fail);
+  const auto vertices = static_cast<std::int64_t>(o.vertices.size() / 3);
+  for (std::size_t k = 0; k < o.triangles.size(); ++k) {
+    if (o.triangles[k] >= 0 && o.triangles[k] < vertices) continue;
+    fail("/body/triangles", fmt::format("expected vertices 0 to {}, found {} in triangle {}",
+                                        vertices - 1, o.triangles[k], k / 3));
+  }
+}
+
+void check_body(const Observation& o, const Fail& fail) {
+  const bool apart = !o.body.empty();
+  if (o.particles < 1) {
+    fail(apart ? "/body/x" : "/x", "expected at least one particle, found none");
+  }
+  const char* volume_name = o.tracked() ? "/body/volume" : "/volume";
   double volumes = 0;
-  for (const double volume : observation.volume) {
-    if (!(volume > 0)) fail("/volume", fmt::format("expected volumes > 0, found {}", volume));
+  for (const double volume : o.volume) {
+    if (!(volume > 0)) fail(volume_name, fmt::format("expected volumes > 0, found {}", volume));
     volumes += volume;
   }
   if (volumes > 1) {
-    fail("/volume",
+    fail(volume_name,
          fmt::format("expected a body that fits the unit cube, found {} m^3 in all", volumes));
   }
-  for (std::size_t k = 0; k < observation.x.size(); ++k) {
-    if (observation.x[k] >= 0 && observation.x[k] <= 1) continue;
-    const std::size_t particle = k / 3, count = std::size_t(observation.particles);
-    fail("/x", fmt::format("expected positions inside the unit cube, found {} m of particle {} in "
-                           "frame {}",
-                           observation.x[k], particle % count, particle / count));
-  }
-  const auto row = static_cast<std::size_t>(3 * observation.particles);
-  const bool one_place =
-      row > 3 && observation.x.size() >= row &&
-      std::equal(observation.x.begin() + 3, observation.x.begin() + row, observation.x.begin());
-  if (one_place) {
-    fail("/x",
+  check_inside(o.body, "/body/x", "particle", false, fail);
+  const std::vector<double> start = o.start();
+  if (start.size() > 3 && std::equal(start.begin() + 3, start.end(), start.begin())) {
+    fail(apart ? "/body/x" : "/x",
          fmt::format("expected a body, found all {} particles at one place in the first frame",
-                     observation.particles));
+                     o.particles));
   }
+}
+
+void check_scene(const Observation& observation, const Fail& fail) {
   const auto scene = [&](bool good, const char* name, const std::string& message) {
     if (!good) fail(fmt::format("attribute {} of /scene", name), message);
   };
@@ -74,7 +127,58 @@ void check(const Observation& observation, const Fail& fail) {
   }
 }
 
+/// What has to hold of an observation whether it is written or read.
+void check(const Observation& observation, const Fail& fail) {
+  check_points(observation, fail);
+  if (observation.vertices.empty()) {
+    check_body(observation, fail);
+  } else {
+    check_surface(observation, fail);
+  }
+  check_scene(observation, fail);
+}
+
+void write_body(hdf5::Writer& writer, const Observation& o) {
+  const std::int64_t particles = o.particles;
+  const hdf5::Info volume{"m^3", "volume of each particle at rest"};
+  if (!o.tracked()) {
+    writer.write("volume", o.volume, {particles}, volume);
+    return;
+  }
+  writer.group("body");
+  if (!o.vertices.empty()) {
+    writer.write("body/vertices", o.vertices, {std::int64_t(o.vertices.size() / 3), 3},
+                 {"m", "closed surface of the body at the first frame"});
+    writer.write("body/triangles", o.triangles, {std::int64_t(o.triangles.size() / 3), 3},
+                 {"1", "rows of vertices"});
+    return;
+  }
+  writer.write("body/x", o.body, {particles, 3}, {"m", "particles at the first frame"});
+  writer.write("body/volume", o.volume, {particles}, volume);
+}
+
+void read_body(const hdf5::Reader& reader, Observation& o) {
+  if (reader.has("body/vertices")) {
+    if (reader.has("body/x")) {
+      reader.fail("/body",
+                  "expected particles (x, volume) or a surface (vertices, triangles), "
+                  "found both");
+    }
+    o.vertices = reader.read<double>("body/vertices", {-1, 3}, hdf5::Values::finite);
+    o.triangles = reader.read<std::int64_t>("body/triangles", {-1, 3});
+    if (o.triangles.empty()) reader.fail("/body/triangles", "expected triangles, found none");
+    return;
+  }
+  o.body = reader.read<double>("body/x", {-1, 3}, hdf5::Values::finite);
+  o.particles = static_cast<std::int64_t>(o.body.size() / 3);
+  o.volume = reader.read<double>("body/volume", {o.particles}, hdf5::Values::finite);
+}
+
 }  // namespace
+
+std::vector<double> Observation::start() const {
+  return body.empty() ? std::vector<double>(x.begin(), x.begin() + 3 * particles) : body;
+}
 
 Observation begin_observation(const kernels::GridSettings& grid, double density,
                               const std::vector<double>& volume) {
@@ -101,14 +205,13 @@ void write_observation(const std::filesystem::path& file, const Observation& obs
   check(observation, [&](const std::string& object, const std::string& message) {
     throw Error(fmt::format("{}: {}: {}", file.string(), object, message));
   });
-  const std::int64_t frames = observation.frames;
-  const std::int64_t particles = observation.particles;
   writer.attribute("/", "format", kFormat);
-  writer.attribute("/", "version", 1);
-  writer.write("x", observation.x, {frames, particles, 3}, {"m", "observed positions"});
-  writer.write("time", observation.time, {frames}, {"s", "time of each frame"});
-  writer.write("volume", observation.volume, {particles},
-               {"m^3", "volume of each particle at rest"});
+  writer.attribute("/", "version", observation.tracked() ? 2 : 1);
+  writer.write("x", observation.x, {observation.frames, observation.points(), 3},
+               {"m", "observed positions, NaN where hidden"});
+  if (!std::isnan(observation.noise)) writer.attribute("x", "noise", observation.noise);
+  writer.write("time", observation.time, {observation.frames}, {"s", "time of each frame"});
+  write_body(writer, observation);
   writer.group("scene");
   writer.attribute("scene", "grid", observation.grid);
   writer.attribute("scene", "dt", observation.dt);
@@ -123,14 +226,25 @@ void write_observation(const std::filesystem::path& file, const Observation& obs
 
 Observation read_observation(const std::filesystem::path& file) {
   const hdf5::Reader reader(file);
-  reader.check_format(kFormat, 1);
+  const std::int64_t version = reader.check_format(kFormat, 2);
   Observation observation;
-  observation.x = reader.read<double>("x", {-1, -1, 3}, hdf5::Values::finite);
+  observation.x = reader.read<double>("x", {-1, -1, 3});
   const hdf5::Shape shape = reader.shape("x");
   observation.frames = shape[0];
-  observation.particles = shape[1];
+  if (reader.has_attribute("x", "noise")) observation.noise = reader.attribute_real("x", "noise");
   observation.time = reader.read<double>("time", {observation.frames}, hdf5::Values::finite);
-  observation.volume = reader.read<double>("volume", {observation.particles}, hdf5::Values::finite);
+  if (version == 1) {
+    observation.particles = shape[1];
+    observation.volume =
+        reader.read<double>("volume", {observation.particles}, hdf5::Values::finite);
+  } else {
+    if (shape[0] < 1 || shape[1] < 1) {
+      reader.fail("/x", fmt::format("expected at least two frames of one point, found {} of {}",
+                                    shape[0], shape[1]));
+    }
+    read_body(reader, observation);
+    observation.tracers.assign(observation.x.begin(), observation.x.begin() + 3 * shape[1]);
+  }
   const auto integer = [&](const char* name) {
     // The nearest int is out of every range that check() knows, too.
     return static_cast<int>(std::clamp<std::int64_t>(reader.attribute_integer("scene", name),

@@ -2,16 +2,28 @@
 
 // observation.h5: what inference may see, and nothing about the material.
 //
-//   attributes  format = "uniphy-observation", version = 1
-//   /x      [frames, particles, 3]  m   observed positions
-//   /time   [frames]                s   from the first frame, which is 0
-//   /volume [particles]             m^3 volume of each particle at rest
+//   attributes  format = "uniphy-observation", version = 1 or 2
+//   /x      [frames, points, 3]     m   observed positions; NaN where a point is hidden
+//           attribute noise (m), optional: standard deviation of a coordinate
+//   /time   [frames]                s   increasing, at any times
 //   /scene  attributes: grid (nodes a side), dt (s), gravity [3] (m/s^2),
 //           walls ("freeslip" or "noslip"), bound (wall thickness in nodes), density (kg/m^3)
+//
+// Version 1: the points are the particles of the body, all of them seen in the first frame.
+//   /volume [particles]             m^3 volume of each particle at rest
+//
+// Version 2: the body as it stands at the first frame, undeformed, and points on it that are not
+// its particles.
+//   /body/x [particles, 3]          m   particles, a dense cloud
+//   /body/volume [particles]        m^3 volume of each at rest
+// or, in their place, a closed surface that the fit fills with particles:
+//   /body/vertices [vertices, 3]    m
+//   /body/triangles [triangles, 3]  rows of vertices, from 0
 
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -21,10 +33,21 @@ namespace uniphy {
 
 struct Observation {
   std::int64_t frames = 0;
-  std::int64_t particles = 0;
-  std::vector<double> x;       ///< [frames, particles, 3] m
+  std::int64_t particles = 0;  ///< of the body; 0 while it is a surface
+  std::vector<double> x;       ///< [frames, points, 3] m, NaN where hidden
   std::vector<double> time;    ///< [frames] s, increasing
   std::vector<double> volume;  ///< [particles] m^3
+  /// Standard deviation of the noise of a coordinate, m; NaN: not known.
+  double noise = std::numeric_limits<double>::quiet_NaN();
+
+  /// [particles, 3] m, the body at the first frame; empty: point p is particle p, and stands where
+  /// the first frame has it.
+  std::vector<double> body;
+  /// [points, 3] m, where the points are at the first frame, NaN where that is not known; empty:
+  /// point p is particle p.
+  std::vector<double> tracers;
+  std::vector<double> vertices;  ///< [vertices, 3] m, the surface of a body without particles
+  std::vector<std::int64_t> triangles;  ///< [triangles, 3]
 
   int grid = 20;
   double dt = 0;  ///< s, of the simulation that explains the observation
@@ -33,16 +56,26 @@ struct Observation {
   int bound = 3;
   double density = 1000;  ///< kg/m^3
 
-  const double* positions(std::int64_t frame) const { return x.data() + frame * particles * 3; }
+  bool tracked() const { return !tracers.empty(); }  ///< the points are tracers
+  std::int64_t points() const {
+    return tracked() ? static_cast<std::int64_t>(tracers.size() / 3) : particles;
+  }
+  const double* positions(std::int64_t frame) const { return x.data() + frame * points() * 3; }
+  /// [particles, 3] m, where a roll-out starts from.
+  std::vector<double> start() const;
+  bool is_seen(std::int64_t frame, std::int64_t point) const {
+    return positions(frame)[3 * point] == positions(frame)[3 * point];
+  }
 };
 
 /// What is known of a scene of one body besides its motion, without any frame; grid.dt is the time
 /// step.
 Observation begin_observation(const kernels::GridSettings& grid, double density,
                               const std::vector<double>& volume);
-/// Adds the positions x [particles, 3] at `time`.
+/// Adds the positions x [points, 3] at `time`.
 void add_frame(Observation& observation, double time, const std::vector<double>& x);
 
+/// Version 1 where the points are the particles, else version 2.
 void write_observation(const std::filesystem::path& file, const Observation& observation);
 /// Throws Error for anything that is missing, of the wrong shape, not finite, or out of range.
 Observation read_observation(const std::filesystem::path& file);

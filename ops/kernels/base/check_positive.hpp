@@ -8,11 +8,12 @@
 
 namespace uniphy::kernels {
 
-/// Throws Error unless all numbers, one a particle, are finite and positive: masses and volumes,
-/// which steps and their adjoints divide by.
+/// Throws Error unless the numbers of the particles [begin, end) are finite and positive: masses
+/// and volumes, which steps and their adjoints divide by.
 template <class T>
-void check_positive(const char* where, const char* name, const T* values, std::ptrdiff_t count) {
-  for (std::ptrdiff_t p = 0; p < count; ++p) {
+void check_positive(const char* where, const char* name, const T* values, std::ptrdiff_t begin,
+                    std::ptrdiff_t end) {
+  for (std::ptrdiff_t p = begin; p < end; ++p) {
     if (values[p] > 0 && std::isfinite(values[p])) continue;
     throw Error(std::string(where) + ": expected a positive " + name + " of particle " +
                 std::to_string(p) + ", found " + std::to_string(values[p]));

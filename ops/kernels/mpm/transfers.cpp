@@ -136,8 +136,8 @@ class Transfer {
 
 template <class T>
 void p2g(const GridSettings& settings, const ParticleArrays<T>& p, T* grid) {
-  check_positive("p2g", "mass", p.mass, p.count);
-  check_positive("p2g", "volume", p.volume, p.count);
+  check_positive("p2g", "mass", p.mass, 0, p.count);
+  check_positive("p2g", "volume", p.volume, 0, p.count);
   Transfer<T> t(settings, p.count, p.x);
   t.load(p.v, 3, kPlaneV);
   t.load(p.C, 9, kPlaneC);

@@ -7,6 +7,7 @@
 #include "ops/kernels/base/between_steps.hpp"
 #include "ops/kernels/base/check_positive.hpp"
 #include "ops/kernels/base/error.hpp"
+#include "ops/kernels/laws/tracer.hpp"
 #include "ops/kernels/rollout/rollout_engine.hpp"
 
 namespace uniphy::kernels {
@@ -40,6 +41,17 @@ void check_steps(std::ptrdiff_t steps, std::ptrdiff_t every, std::ptrdiff_t leas
   }
 }
 
+template <class T>
+void check_tracers(const std::vector<T>& mass, const std::vector<T>& volume, std::ptrdiff_t begin,
+                   std::ptrdiff_t end) {
+  for (std::ptrdiff_t p = begin; p < end; ++p) {
+    if (mass[p] == 0 && volume[p] == 0) continue;
+    throw Error("roll-out: expected mass 0 and volume 0 of particle " + std::to_string(p) +
+                ", a tracer, found " + std::to_string(mass[p]) + " kg and " +
+                std::to_string(volume[p]) + " m^3");
+  }
+}
+
 }  // namespace
 
 template <class T>
@@ -53,11 +65,17 @@ Rollout<T>::Rollout(const GridSettings& grid, std::vector<BodyRange<T>> bodies, 
   const std::ptrdiff_t expected = bodies_.empty() ? 0 : bodies_.back().end;
   check_size("mass", mass_, expected);
   check_size("volume", volume_, expected);
-  check_positive("roll-out", "mass", mass_.data(), expected);
-  check_positive("roll-out", "volume", volume_.data(), expected);
   std::vector<ParticleRange> ranges;
   for (const auto& body : bodies_) ranges.emplace_back(body.begin, body.end);
   ParticleOrder{ranges};  // refuses ranges that do not fit
+  for (const auto& body : bodies_) {
+    if (is_tracer(*body.law)) {
+      check_tracers(mass_, volume_, body.begin, body.end);
+    } else {
+      check_positive("roll-out", "mass", mass_.data(), body.begin, body.end);
+      check_positive("roll-out", "volume", volume_.data(), body.begin, body.end);
+    }
+  }
 }
 
 template <class T>

@@ -81,7 +81,8 @@ template <class T>
 class Rollout {
  public:
   /// mass (kg) and volume (rest volume, m³) [P]; bodies contiguous, in order, covering all.
-  /// Throws Error where they do not, or where a number is not positive or the settings are bad.
+  /// Throws Error where they do not, or where a number is not positive (of a Tracer: not 0) or the
+  /// settings are bad.
   Rollout(const GridSettings& grid, std::vector<BodyRange<T>> bodies, std::vector<T> mass,
           std::vector<T> volume);
 

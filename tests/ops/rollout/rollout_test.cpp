@@ -98,6 +98,63 @@ TEST(Rollout, TwoBodiesEachTakeTheirGradient) {
   }
 }
 
+/// The scene with tracers of its own after the body's particles.
+struct TracedScene : RolloutScene {
+  Tensor tracers =
+      torch::tensor({{0.52, 0.3, 0.45}, {0.41, 0.2, 0.36}, {0.58, 0.35, 0.5}}, torch::kFloat64);
+
+  RolloutFrames run(const LawDescription& law, const Tensor& parameters, const Tensor& start,
+                    const Tensor& velocity) const {
+    const std::int64_t P = x.size(0), all = P + start.size(0);
+    RolloutBody points;
+    points.begin = P, points.end = all, points.tracers = true;
+    const auto zeros = [&] { return torch::zeros({start.size(0)}, torch::kFloat64); };
+    return rollout(torch::cat({x, start}), torch::cat({velocity, torch::zeros_like(start)}), {}, {},
+                   torch::cat({mass, zeros()}), torch::cat({volume, zeros()}),
+                   {body(law, parameters), points}, settings);
+  }
+};
+
+TEST(Rollout, TracersMoveWithTheGridAndChangeNothing) {
+  TracedScene scene;
+  const LawDescription law = sample_law(LawId::elastic);
+  // A tracer that stands where a particle does moves like it.
+  const Tensor start = torch::cat({scene.tracers, scene.x.slice(0, 7, 8)});
+  const Tensor x = scene.run(law, parameters_of(law), start, scene.v).x;
+  const std::int64_t P = scene.x.size(0);
+  EXPECT_TRUE(torch::equal(x.slice(1, 0, P), scene.RolloutScene::run(law, {}).x));
+  EXPECT_LE((x.select(1, P + 3) - x.select(1, 7)).abs().max().item<double>(), 1e-15);
+  EXPECT_GE((x[-1] - x[0]).slice(0, P).norm(2, 1).min().item<double>(), 1e-2);
+}
+
+TEST(Rollout, GradientsOfTracersAgreeWithCentralDifferences) {
+  TracedScene scene;
+  const LawDescription law = sample_law(LawId::elastic);
+  const Tensor p = parameters_of(law);
+  const auto loss = [&](const Tensor& parameters, const Tensor& start, const Tensor& v) {
+    const Tensor x = scene.run(law, parameters, start, v).x.slice(1, scene.x.size(0));
+    return (x * torch::sin(torch::arange(x.numel(), torch::kFloat64).view_as(x))).sum();
+  };
+  const std::vector<Tensor> leaves{p.clone().requires_grad_(),
+                                   scene.tracers.clone().requires_grad_(),
+                                   scene.v.clone().requires_grad_()};
+  const auto g = torch::autograd::grad({loss(leaves[0], leaves[1], leaves[2])}, leaves);
+  torch::manual_seed(5);
+  for (std::size_t i = 0; i < leaves.size(); ++i) {
+    const Tensor direction = torch::randn_like(g[i]) * (i == 0 ? p : torch::ones({}));
+    const auto value = [&](const std::vector<double>& t) {
+      std::vector<Tensor> at;
+      for (std::size_t k = 0; k < leaves.size(); ++k)
+        at.push_back(k == i ? leaves[k].detach() + t[0] * direction : leaves[k].detach());
+      return loss(at[0], at[1], at[2]).item<double>();
+    };
+    EXPECT_LE(relative_error({(direction * g[i]).sum().item<double>()},
+                             central_differences(value, {0}, {i == 0 ? 1e-3 : 1e-5})),
+              1e-6)
+        << i;
+  }
+}
+
 TEST(Rollout, SameBitsOnOneThreadAndOnTwo) {
   const int before = omp_get_max_threads();
   for (const auto type : {torch::kFloat32, torch::kFloat64}) {

@@ -101,7 +101,7 @@ TEST(Outside, ATruthInsideOfAFamilyIsForecastByItAlone) {
   options.stages = {{1, 2, 30}};
   FitHooks quiet;
   quiet.progress = false;
-  const Forecast right = forecast(seen, "seen", *variables, options, {}, quiet);
+  const Forecast right = forecast({seen, "seen"}, *variables, options, {}, quiet);
   EXPECT_LT(right.fit, 1e-4);
   EXPECT_LT(right.forecast, 3e-4);
   EXPECT_TRUE(right.explained);
@@ -109,7 +109,7 @@ TEST(Outside, ATruthInsideOfAFamilyIsForecastByItAlone) {
   // Far too stiff, and no way to become softer.
   const auto wrong = make_analytic_variables(law.id, {{4e5, 4.1e5}, {3e5, 3e5}}, 1, 1);
   options.stages = {{1, 1, 1}};
-  const Forecast stiff = forecast(seen, "seen", *wrong, options, {}, quiet);
+  const Forecast stiff = forecast({seen, "seen"}, *wrong, options, {}, quiet);
   EXPECT_GT(stiff.forecast, 10 * right.forecast);
   EXPECT_FALSE(stiff.explained);
 }

@@ -164,7 +164,8 @@ TEST(Adaptation, GoesOnToTheSameBits) {
   int more = 0;
   hooks.on_record = [&](const FitRecord&) { ++more; };
   const Adaptation resumed = testing::on_threads(2, [&] { return run(hooks); });
-  EXPECT_LT(more, records / 2);
+  // A step that was stopped is made again, with all roll-outs of its Jacobian.
+  EXPECT_LT(more, 2 * records / 3);
   EXPECT_EQ(resumed.rung, whole.rung);
   EXPECT_EQ(resumed.fit.mse, whole.fit.mse);
   EXPECT_EQ(resumed.fit.u, whole.fit.u);

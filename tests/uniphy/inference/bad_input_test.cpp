@@ -68,8 +68,29 @@ INSTANTIATE_TEST_SUITE_P(
                        "x"},
         BadObservation{"TimesGoBack", [](Observation& o) { o.time[2] = o.time[1]; },
                        "expected increasing times"},
-        BadObservation{"TimesBetweenSteps", [](Observation& o) { o.time[3] += 0.5 * o.dt; },
-                       "expected frames at whole multiples of dt"},
+        BadObservation{"HiddenInTheFirstFrame",
+                       [](Observation& o) { o.x[3] = o.x[4] = o.x[5] = std::nan(""); },
+                       "expected every particle in the first frame, found NaN of point 1"},
+        BadObservation{"HalfHidden",
+                       [](Observation& o) { o.x[3 * o.particles + 1] = std::nan(""); },
+                       "expected three coordinates, or NaN in all of them, found both of point 0 "
+                       "in frame 1"},
+        BadObservation{"NoiseOfTheSceneItself", [](Observation& o) { o.noise = 2; },
+                       "attribute noise of /x: expected 0 to 1 m, found 2"},
+        BadObservation{"TracersWithoutABody",
+                       [](Observation& o) {
+                         o.tracers.assign(o.x.begin(), o.x.begin() + 3 * o.particles);
+                         o.particles = 0;
+                         o.volume.clear();
+                       },
+                       "expected at least one particle, found none"},
+        BadObservation{"ATriangleOfNoVertex",
+                       [](Observation& o) {
+                         o.tracers.assign(o.x.begin(), o.x.begin() + 3 * o.particles);
+                         o.vertices.assign(9, 0.5);
+                         o.triangles = {0, 1, 3};
+                       },
+                       "/body/triangles: expected vertices 0 to 2, found 3 in triangle 0"},
         BadObservation{"NoVolume", [](Observation& o) { o.volume[4] = 0; }, "expected volumes > 0"},
         BadObservation{"UnknownWalls", [](Observation& o) { o.walls = "sticky"; },
                        "expected \"freeslip\" or \"noslip\""},

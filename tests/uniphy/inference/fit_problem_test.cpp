@@ -20,8 +20,8 @@ FitOptions options_with(double prior, bool velocity = false) {
   options.dtype = "float64";
   options.prior = prior;
   options.prior_sigma = 2;
-  options.refine_velocity = velocity;
-  options.stages = {{1, 1, 1}};
+  // The last stage of least squares moves the velocity; gradients do where there is noise.
+  options.stages = {{1, 1, 1, velocity ? kLevenbergMarquardt : "lbfgs"}};
   return options;
 }
 
@@ -116,6 +116,20 @@ TEST(FitProblem, TheSquaresOfTheResidualsSumToTheLoss) {
   FitCandidate c = problem.candidate(0);
   c.u[0] = 50;  // far too stiff for the time step
   EXPECT_FALSE(problem.residuals(c.u, problem.frames()).defined());
+}
+
+TEST(FitProblem, APointOfLeastSquaresMayHaveTheVelocityWithIt) {
+  const Setting s;
+  const FitOptions options = options_with(0, true);
+  const FitProblem problem(s.observation, s.name, *s.variables, options);
+  FitCandidate c = problem.candidate(3);
+  c.motion = torch::tensor({0.2, -0.1, 0.3, 0.1, 0.4, -0.2}, torch::kFloat64);
+  const Tensor point = torch::cat({c.u, c.motion});
+  const double loss = problem.evaluate(problem.leaves(c, 0), 0).loss.item<double>();
+  const Tensor r = problem.residuals(point, problem.frames());
+  EXPECT_NEAR(r.square().sum().item<double>(), loss, 1e-12 * loss);
+  EXPECT_EQ(problem.motion_at(point).linear, problem.motion(c).linear);
+  EXPECT_EQ(problem.motion_at(point).angular, problem.motion(c).angular);
 }
 
 TEST(FitProblem, WhereTheRollOutFailsTheLossIsInfiniteAndThereIsNoGradient) {

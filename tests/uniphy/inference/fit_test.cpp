@@ -98,21 +98,33 @@ TEST(Fit, APriorDrawsTheCodeTowardsZero) {
   EXPECT_GT(square(wide), 0.8 * square(free));
 }
 
-TEST(Fit, RefinesTheInitialVelocityTogether) {
+TEST(Fit, NoiseIsWhatMakesTheGradientsFitTheVelocityToo) {
   const Hidden hidden;
   Observation noisy = hidden.observation;
   std::mt19937 random(4);
   std::normal_distribution<double> noise(0, 3e-5);
   for (double& x : noisy.x) x += noise(random);
   FitOptions options = schedule("float64");
+  noisy.noise = 0;  // as it says
   const FitResult plain = fit_observation(noisy, "o", *hidden.variables, options, quiet());
-  options.refine_velocity = true;
+  noisy.noise = 3e-5;
   options.stages.back().epochs = 40;
-  const FitResult refined = fit_observation(noisy, "o", *hidden.variables, options, quiet());
+  const FitResult fitted = fit_observation(noisy, "o", *hidden.variables, options, quiet());
   const RigidMotion truth = testing::ObservedScene{}.motion;
-  EXPECT_LT(refined.mse, 0.3 * plain.mse);
-  EXPECT_LT((refined.motion.linear - truth.linear).norm(),
+  EXPECT_LT(fitted.mse, 0.3 * plain.mse);
+  EXPECT_LT((fitted.motion.linear - truth.linear).norm(),
             0.5 * (plain.motion.linear - truth.linear).norm());
+}
+
+TEST(Fit, LeastSquaresFindsTheCodeAndTheVelocity) {
+  const Hidden hidden;
+  FitOptions options = schedule("float64", kLevenbergMarquardt);
+  const FitResult r = fit_observation(hidden.observation, "o", *hidden.variables, options, quiet());
+  EXPECT_LT(r.mse, 5e-12);
+  EXPECT_NEAR(r.law.z[3], hidden.law.z[3], 1e-3);
+  const RigidMotion truth = testing::ObservedScene{}.motion;
+  EXPECT_LT((r.motion.linear - truth.linear).norm(), 2e-4);
+  EXPECT_LT((r.motion.angular - truth.angular).norm(), 1e-3);
 }
 
 TEST(Fit, OneAndTwoThreadsGiveTheSameBits) {
@@ -149,7 +161,8 @@ class StoppedAfter : public ::testing::TestWithParam<Stop> {};
 
 TEST_P(StoppedAfter, GoesOnToTheSameBits) {
   const Hidden hidden;
-  FitOptions options = schedule("float32", GetParam().optimizer);
+  const bool differences = std::string(GetParam().optimizer) == kLevenbergMarquardt;
+  FitOptions options = schedule(differences ? "float64" : "float32", GetParam().optimizer);
   options.stages.back().epochs = 5;
   const FitResult whole =
       fit_observation(hidden.observation, "o", *hidden.variables, options, quiet());
@@ -183,7 +196,9 @@ TEST_P(StoppedAfter, GoesOnToTheSameBits) {
 // In the first stage, between its evaluations; in the second; in the last.
 INSTANTIATE_TEST_SUITE_P(Records, StoppedAfter,
                          ::testing::Values(Stop{"lbfgs", 15}, Stop{"lbfgs", 24}, Stop{"lbfgs", 34},
-                                           Stop{"adamw", 6}, Stop{"adamw", 24}, Stop{"adamw", 34}));
+                                           Stop{"adamw", 6}, Stop{"adamw", 24}, Stop{"adamw", 34},
+                                           Stop{kLevenbergMarquardt, 40},
+                                           Stop{kLevenbergMarquardt, 150}));
 
 TEST(Fit, ACandidateThatFailsIsDroppedAndTheOthersGoOn) {
   Hidden hidden;

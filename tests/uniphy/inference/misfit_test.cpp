@@ -31,7 +31,7 @@ TEST(Misfit, SaysHowFarWhenAndWhere) {
       fitted.x[3 * (f * o.particles + p)] += 0.02 * size;
     }
   }
-  const Misfit m = misfit_of(o, fitted, 1e-3);
+  const Misfit m = misfit_of(o, fitted, 1e-3, false);
   const double root = 0.02 * std::sqrt(double(off) / double(3 * o.particles));
   EXPECT_EQ(m.root[5], 0);
   EXPECT_NEAR(m.root[6], root, 1e-12);
@@ -53,9 +53,34 @@ TEST(Misfit, SaysHowFarWhenAndWhere) {
   EXPECT_EQ(misfit_chart(m).series.size(), 3u);
 }
 
+TEST(Misfit, NoiseIsNoReasonForALargerForecastError) {
+  testing::ObservedScene scene;
+  scene.frames = 11;
+  Observation o = testing::observe(testing::elastic_body(), scene);
+  const Trajectory fitted = observed_trajectory(o);
+  o.noise = 0.01 * 0.25;  // of the size
+  const Misfit plain = misfit_of(o, fitted, 1e-3, false), moved = misfit_of(o, fitted, 1e-3, true);
+  EXPECT_NEAR(plain.allowed, std::hypot(1e-3, 0.02), 1e-12);
+  EXPECT_NEAR(moved.allowed, std::hypot(1e-3, 0.011), 1e-12);
+  EXPECT_NEAR(moved.allowed_ahead, std::hypot(5e-3, 0.011), 1e-12);
+}
+
+TEST(Misfit, WhatIsHiddenDoesNotCount) {
+  testing::ObservedScene scene;
+  scene.frames = 3;
+  Observation o = testing::observe(testing::elastic_body(), scene);
+  Trajectory fitted = observed_trajectory(o);
+  for (double& x : fitted.x) x += 1e-3;
+  std::fill(o.x.begin() + 6 * o.particles, o.x.end(), std::nan(""));
+  const Misfit m = misfit_of(o, fitted, 1e-3, false);
+  EXPECT_NEAR(m.over_size, 1e-3 / 0.25, 1e-12);
+  EXPECT_EQ(m.root[2], 0);
+}
+
 TEST(Misfit, AForecastMayMissFiveTimesAsMuchAsAFit) {
   Inference found;
   found.misfit.allowed = 1e-3;
+  found.misfit.allowed_ahead = 5e-3;
   found.misfit.over_size = 0.9e-3;
   EXPECT_TRUE(explains(found));
   found.rungs.resize(2);

@@ -89,6 +89,107 @@ TEST(MotionObjective, UnevenFramesAreComparedWithTheirOwnStates) {
   EXPECT_NEAR(found, expected, 1e-12 * expected);
 }
 
+TEST(MotionObjective, ATimeBetweenTwoStepsLiesOnTheLineBetweenTheirPositions) {
+  Problem p(testing::elastic_body());
+  const Observation& o = p.observation;
+  Observation some = o;
+  some.frames = 4;
+  some.time = {0, o.time[10] + 0.25 * o.dt, o.time[10] + 0.75 * o.dt, o.time[20]};
+  some.x.resize(4 * 3 * o.particles);
+  const auto objective = make_motion_objective(some, observed_steps(some, "o"), p.grid, "float64");
+  const auto law = testing::elastic_body(3e4, 2e4);
+  std::vector<std::vector<double>> x;
+  objective->simulate(law, p.motion, [&](std::ptrdiff_t, const auto& at) { x.push_back(at); });
+  ASSERT_EQ(x.size(), 4u);
+  Observation every = o;  // the state of every step
+  every.frames = 13;
+  every.time.clear();
+  for (int s = 0; s < 13; ++s) every.time.push_back((s == 0 ? 0 : 39 + s) * o.dt);
+  every.x.resize(13 * 3 * o.particles);
+  const auto fine = make_motion_objective(every, observed_steps(every, "o"), p.grid, "float64");
+  std::vector<std::vector<double>> states;
+  fine->simulate(law, p.motion, [&](std::ptrdiff_t, const auto& at) { states.push_back(at); });
+  for (std::size_t k = 0; k < x[1].size(); ++k) {  // frame 10 is step 50, state 11
+    EXPECT_NEAR(x[1][k], 0.75 * states[11][k] + 0.25 * states[12][k], 1e-14);
+    EXPECT_NEAR(x[2][k], 0.25 * states[11][k] + 0.75 * states[12][k], 1e-14);
+  }
+  // The tensor of the op is the same.
+  const Tensor r = objective->residuals(p.body(law), p.velocities(), 4);
+  for (int f = 1; f < 4; ++f) {
+    const Tensor found = r[f] + to_tensor({some.positions(f), some.positions(f) + x[f].size()});
+    EXPECT_LE((found - to_tensor(x[f])).abs().max().item<double>(), 1e-14) << f;
+  }
+}
+
+/// Every fifth particle as a tracked point.
+Observation tracked(const Observation& whole) {
+  Observation o = whole;
+  o.body = whole.start();
+  o.x.clear();
+  for (std::int64_t f = 0; f < o.frames; ++f) {
+    for (std::int64_t p = 0; p < whole.particles; p += 5)
+      o.x.insert(o.x.end(), whole.positions(f) + 3 * p, whole.positions(f) + 3 * p + 3);
+  }
+  const auto row = static_cast<std::ptrdiff_t>(o.x.size()) / o.frames;
+  o.tracers.assign(o.x.begin(), o.x.begin() + row);
+  return o;
+}
+
+TEST(MotionObjective, TrackedPointsFollowTheBody) {
+  const Problem p(testing::elastic_body());
+  Observation points = tracked(p.observation);
+  const auto objective = [&] { return make_motion_objective(points, p.steps, p.grid, "float64"); };
+  const Tensor all = torch::cat({p.velocities(), torch::zeros({points.points(), 3})});
+  const auto mse = [&](const kernels::LawDescription& law) {
+    return objective()->mse(p.body(law), all, 41).item<double>();
+  };
+  EXPECT_LT(mse(testing::elastic_body()), 1e-28);
+  const auto law = testing::elastic_body(3e4, 2e4);
+  const double seen = mse(law);
+  EXPECT_NEAR(mean_of_first(objective()->frame_mse(law, p.motion, 41), 41), seen, 1e-12 * seen);
+  // What is hidden counts nowhere, and the mean is over what is left.
+  std::vector<double> square(41 * points.points());
+  const Tensor r = objective()->residuals(p.body(law), all, 41);
+  double expected = 0, count = 0;
+  for (std::int64_t f = 0; f < 41; ++f) {
+    for (std::int64_t q = 0; q < points.points(); ++q) {
+      if ((f + q) % 3 == 1) {
+        for (int k = 0; k < 3; ++k) points.x[3 * (f * points.points() + q) + k] = std::nan("");
+        continue;
+      }
+      expected += r[f].slice(0, 3 * q, 3 * q + 3).square().sum().item<double>();
+      count += 3;
+    }
+  }
+  EXPECT_NEAR(mse(law), expected / count, 1e-12 * expected / count);
+  EXPECT_NEAR(mean_of_first(objective()->frame_mse(law, p.motion, 41), 41), expected / count,
+              1e-12 * expected / count);
+}
+
+TEST(MotionObjective, FlowGradientsSayHowAStartMovesThePath) {
+  const Problem p(testing::elastic_body());
+  Observation points = tracked(p.observation);
+  const auto law = testing::elastic_body();
+  const auto paths = [&] {
+    std::vector<double> x;
+    make_motion_objective(points, p.steps, p.grid, "float64")
+        ->simulate(law, p.motion, [&](std::ptrdiff_t, const std::vector<double>& at) {
+          x.insert(x.end(), at.begin(), at.end());
+        });
+    return to_tensor(x).view({41, -1, 3});
+  };
+  const Tensor G =
+      make_motion_objective(points, p.steps, p.grid, "float64")->flow_gradients(law, p.motion, 41);
+  EXPECT_TRUE(torch::equal(G[0][0], torch::eye(3, torch::kFloat64)));
+  const Tensor before = paths();
+  constexpr double kStep = 1e-5;
+  for (std::size_t k = 1; k < points.tracers.size(); k += 3) points.tracers[k] += kStep;
+  const Tensor expected = (paths() - before) / kStep, found = G.select(3, 1);
+  // The affine velocity C is a mean over the kernel of the slope that moves the point.
+  EXPECT_LE(((found - expected).norm() / expected.norm()).item<double>(), 0.05);
+  EXPECT_GE((expected[40] - expected[0]).norm().item<double>(), 1);
+}
+
 /// Relative difference of a gradient from central differences.
 double gradient_error(const Problem& p, const Tensor& parameters,
                       const kernels::LawDescription& law, const std::vector<double>& steps,

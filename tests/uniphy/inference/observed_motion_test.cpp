@@ -71,16 +71,76 @@ TEST(ObservedSteps, FramesMayBeUneven) {
   EXPECT_EQ(steps.last(2), 4);
 }
 
-TEST(ObservedSteps, TimesBetweenStepsAreRefused) {
+TEST(ObservedSteps, TimesMayLieBetweenSteps) {
   Observation o;
   o.dt = 1e-3;
-  o.frames = 2;
-  o.time = {0, 0.0045};
-  EXPECT_THAT(testing::error_of([&] { observed_steps(o, "seen.h5"); }),
-              HasSubstr("seen.h5: /time: expected frames at whole multiples of dt = 0.001 s, found "
-                        "0.0045 s at frame 1"));
-  o.time = {0, 1e-6};  // rounds to no step at all
-  testing::error_of([&] { observed_steps(o, "seen.h5"); });
+  o.time = {0.5, 0.5045, 0.51, 0.51001};  // the last one is the step before it, to a hundredth
+  o.frames = 4;
+  const ObservedSteps steps = observed_steps(o, "o");
+  EXPECT_THAT(steps.step, ::testing::ElementsAre(0, 4, 10, 10));
+  EXPECT_EQ(steps.fraction[0], 0);
+  EXPECT_NEAR(steps.fraction[1], 0.5, 1e-9);
+  EXPECT_EQ(steps.fraction[2], 0);
+  EXPECT_EQ(steps.fraction[3], 0);
+  EXPECT_EQ(steps.stride, 1);
+  EXPECT_EQ(steps.last(2), 5);
+  EXPECT_EQ(steps.last(3), 10);
+}
+
+/// A body that falls far from the walls, of which some points are tracked.
+Observation tracked_fall(std::int64_t every) {
+  testing::ObservedScene scene;
+  scene.motion.centre = {0.5, 0.55, 0.5};
+  scene.frames = 12;
+  Observation o = testing::observe(testing::elastic_body(), scene);
+  o.body = o.start();
+  std::vector<double> x;
+  for (std::int64_t f = 0; f < o.frames; ++f) {
+    for (std::int64_t p = 0; p < o.particles; p += every)
+      x.insert(x.end(), o.positions(f) + 3 * p, o.positions(f) + 3 * p + 3);
+  }
+  o.tracers.assign(x.begin(), x.begin() + static_cast<std::ptrdiff_t>(x.size()) / o.frames);
+  o.x = x;
+  return o;
+}
+
+TEST(ObservedMotion, IsFoundFromTrackedPointsOfWhichSomeAreHidden) {
+  Observation o = tracked_fall(17);
+  const testing::ObservedScene scene;
+  for (int k = 0; k < 3; ++k) {
+    o.x[3 * 2 + k] = o.tracers[3 * 2 + k] = std::nan("");  // in the first frame
+    o.x[3 * (o.points() + 4) + k] = std::nan("");          // in the second
+  }
+  const RigidMotion m = observed_motion(o, observed_steps(o, "o"), observed_grid(o, "o"), 1);
+  EXPECT_LT((m.linear - scene.motion.linear).norm(), 2e-3);
+  EXPECT_LT((m.angular - scene.motion.angular).norm(), 1e-2 * scene.motion.angular.norm());
+}
+
+TEST(ObservedMotion, TakesAsManyFramesAsTheNoiseAsksFor) {
+  Observation o = tracked_fall(3);
+  std::mt19937 random(1);
+  std::normal_distribution<double> noise(0, 1e-3);
+  for (double& x : o.x) x += noise(random);
+  std::copy_n(o.x.begin(), o.tracers.size(), o.tracers.begin());
+  const auto steps = observed_steps(o, "o");
+  const auto grid = observed_grid(o, "o");
+  const Eigen::Vector3d truth = testing::ObservedScene{}.motion.linear;
+  o.noise = 1e-3;
+  const double many = (observed_motion(o, steps, grid).linear - truth).norm();
+  EXPECT_LT(many, 0.4 * (observed_motion(o, steps, grid, 1).linear - truth).norm());
+  o.noise = 0;  // as it says
+  EXPECT_EQ(observed_motion(o, steps, grid).linear, observed_motion(o, steps, grid, 1).linear);
+}
+
+TEST(ObservedMotion, ContactOfTrackedPointsIsWhereTheBodyReachesAWall) {
+  Observation o = tracked_fall(17);
+  const auto steps = observed_steps(o, "o");
+  const auto grid = observed_grid(o, "o");
+  RigidMotion motion = testing::ObservedScene{}.motion;
+  motion.centre = centre_of_mass(o);
+  EXPECT_EQ(first_contact(o, steps, grid, motion), o.frames);
+  motion.linear[1] = -40;  // 0.1 m in a frame, and the lowest corner begins 0.17 m above its reach
+  EXPECT_EQ(first_contact(o, steps, grid, motion), 2);
 }
 
 }  // namespace

@@ -48,6 +48,29 @@ TEST(Observation, ReadsBackToTheSameBits) {
   EXPECT_EQ(read.positions(1)[0], 0.06);
 }
 
+TEST(Observation, TrackedPointsAndTheirBodyReadBack) {
+  const testing::Scratch scratch;
+  Observation written = example();
+  written.body = {0.1, 0.1, 0.1, 0.2, 0.1, 0.1, 0.1, 0.3, 0.1};
+  written.particles = 3;
+  written.volume = {1e-6, 2e-6, 3e-6};
+  written.tracers.assign(written.x.begin(), written.x.begin() + 6);
+  written.noise = 1e-3;
+  for (int k = 0; k < 3; ++k) written.x[9 + k] = std::nan("");  // point 1 in frame 1
+  write_observation(scratch.file("o.h5"), written);
+  const Observation read = read_observation(scratch.file("o.h5"));
+  EXPECT_TRUE(read.tracked());
+  EXPECT_EQ(read.points(), 2);
+  EXPECT_EQ(read.particles, 3);
+  EXPECT_EQ(read.body, written.body);
+  EXPECT_EQ(read.start(), written.body);
+  EXPECT_EQ(read.tracers, written.tracers);
+  EXPECT_EQ(read.noise, 1e-3);
+  EXPECT_FALSE(read.is_seen(1, 1));
+  EXPECT_TRUE(read.is_seen(1, 0));
+  EXPECT_EQ(read.positions(2)[0], 0.12);
+}
+
 TEST(Observation, HoldsNothingAboutTheMaterial) {
   const testing::Scratch scratch;
   write_observation(scratch.file("o.h5"), example());
@@ -90,14 +113,14 @@ TEST(Observation, ImpossibleValuesAreRefused) {
        [](Observation& o) { o.x.assign(o.x.size(), 0); }},
       {"o.h5: /time: expected increasing times, found 0.1 s after 0.1 s",
        [](Observation& o) { o.time[2] = 0.1; }},
-      {"o.h5: /x: expected positions inside the unit cube, found -0.1 m of particle 1 in frame 2",
+      {"o.h5: /x: expected positions inside the unit cube, found -0.1 m of point 1 in frame 2",
        [](Observation& o) { o.x[16] = -0.1; }},
       {"o.h5: /volume: expected a body that fits the unit cube, found 2.000002 m^3 in all",
        [](Observation& o) { o.volume[0] = 2; }},
       {"o.h5: /volume: expected volumes > 0, found 0", [](Observation& o) { o.volume[0] = 0; }},
       {"o.h5: /x: expected 18 numbers for the shape [3, 2, 3], found 17",
        [](Observation& o) { o.x.pop_back(); }},
-      {"o.h5: /x: expected at least two frames of one particle, found 1 of 2",
+      {"o.h5: /x: expected at least two frames of one point, found 1 of 2",
        [](Observation& o) { o.frames = 1; }},
   };
   for (const Case& c : cases) {

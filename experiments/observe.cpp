@@ -1,0 +1,55 @@
+#include <cstdio>
+
+#include "ops/kernels/base/error.hpp"
+#include "uniphy/data/laboratory_view.hpp"
+#include "uniphy/report/experiment.hpp"
+
+int main(int argc, char** argv) {
+  const uniphy::ExperimentInfo info{
+      "uniphy_observe",
+      "Makes of an observation that shows everything what a laboratory would see: a part of the "
+      "points, some of the frames, noise, hidden points.",
+      {"CONFIG.yaml         what is seen",
+       "observation.h5      as uniphy_simulate writes it with output.observation=true"},
+      {"DIR/observation.h5  what is left of it (layout: uniphy/io/observation.hpp)"},
+      {"uniphy_observe configs/observe/tracked.yaml --set observation=out/cube/observation.h5"}};
+  return uniphy::run_experiment(
+      argc, argv, info, [](uniphy::Section& config) -> uniphy::RunFunction {
+        using uniphy::between;
+        const std::filesystem::path file =
+            config.input_file("observation", uniphy::required, "what there is to see");
+        uniphy::LaboratoryView view;
+        uniphy::Section points = config.section("points", "the tracked points");
+        view.share = points.real("share", 1, uniphy::Range{0, 1, true}, "",
+                                 "of the points, drawn; below 1 they are tracers, with the body of "
+                                 "the first frame beside them");
+        view.hidden = points.real("hidden", 0, between(0, 0.99), "",
+                                  "share of their positions that is hidden, drawn");
+        uniphy::Section frames = config.section("frames", "when they are seen");
+        view.stride = frames.integer("stride", 1, between(1, 1000000), "", "every so many");
+        view.last =
+            frames.integer("last", -1, between(-1, 1e9), "", "number of the last one; -1: all");
+        uniphy::Section noise = config.section("noise", "of every coordinate, normal");
+        view.noise = noise.real("over_size", 0, between(0, 1), "",
+                                "standard deviation over the largest side of the body");
+        view.says_noise = noise.boolean("known", true, "the observation says how large it is");
+        view.seed = static_cast<std::uint64_t>(
+            config.integer("seed", 1, between(0, 9e15), "", "of all that is drawn"));
+        return [=](uniphy::RunDirectory& out, uniphy::Metrics& metrics) {
+          uniphy::Observation seen;
+          try {
+            seen = laboratory_view(uniphy::read_observation(file), view);
+          } catch (const uniphy::Error& error) {
+            const std::string text = error.what(), name = file.string();
+            throw uniphy::Error(text.rfind(name, 0) == 0 ? text : name + ": " + text);
+          }
+          write_observation(out.file("observation.h5"), seen);
+          metrics.set("points", static_cast<double>(seen.points()));
+          metrics.set("frames", static_cast<double>(seen.frames));
+          metrics.set("noise", seen.noise);
+          std::printf("%lld points in %lld frames, noise %.3g m: %s\n",
+                      static_cast<long long>(seen.points()), static_cast<long long>(seen.frames),
+                      seen.noise, out.file("observation.h5").c_str());
+        };
+      });
+}

@@ -1,0 +1,95 @@
+#include "uniphy/data/laboratory_view.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/uniphy/support/scratch.hpp"
+
+namespace uniphy {
+namespace {
+
+using ::testing::HasSubstr;
+
+/// 64 particles of a box of side 0.4 that moves along x, 21 frames.
+Observation moving_box() {
+  Observation o;
+  o.dt = 1e-3;
+  o.frames = 21;
+  o.particles = 64;
+  o.volume.assign(64, 1e-3);
+  for (std::int64_t f = 0; f < o.frames; ++f) {
+    o.time.push_back(0.01 * double(f));
+    for (int p = 0; p < 64; ++p) {
+      o.x.push_back(0.3 + 0.4 / 3 * (p / 16) + 0.002 * double(f));
+      o.x.push_back(0.3 + 0.4 / 3 * (p / 4 % 4));
+      o.x.push_back(0.3 + 0.4 / 3 * (p % 4));
+    }
+  }
+  return o;
+}
+
+TEST(LaboratoryView, EverythingIsWhatItWas) {
+  const Observation whole = moving_box(), seen = laboratory_view(whole, {});
+  EXPECT_FALSE(seen.tracked());
+  EXPECT_EQ(seen.x, whole.x);
+  EXPECT_EQ(seen.time, whole.time);
+  EXPECT_EQ(seen.noise, 0);
+}
+
+TEST(LaboratoryView, APartOfThePointsIsTrackedBesideTheBody) {
+  const Observation whole = moving_box();
+  LaboratoryView view;
+  view.share = 0.25;
+  view.stride = 5;
+  const Observation seen = laboratory_view(whole, view);
+  ASSERT_TRUE(seen.tracked());
+  EXPECT_EQ(seen.points(), 16);
+  EXPECT_EQ(seen.frames, 5);
+  EXPECT_EQ(seen.body, whole.start());
+  EXPECT_THAT(seen.time, ::testing::ElementsAre(0, 0.05, 0.1, 0.15, 0.2));
+  for (std::int64_t p = 0; p < 16; ++p)
+    EXPECT_NEAR(seen.positions(4)[3 * p] - seen.positions(0)[3 * p], 0.04, 1e-12);
+  EXPECT_EQ(std::vector<double>(seen.x.begin(), seen.x.begin() + 48), seen.tracers);
+  view.seed = 2;
+  EXPECT_NE(laboratory_view(whole, view).tracers, seen.tracers);
+  view.seed = 1;
+  EXPECT_EQ(laboratory_view(whole, view).tracers, seen.tracers);
+}
+
+TEST(LaboratoryView, NoiseAndHiddenPointsAreAsManyAsAskedFor) {
+  const Observation whole = moving_box();
+  LaboratoryView view;
+  view.noise = 0.01;
+  view.hidden = 0.25;
+  const Observation seen = laboratory_view(whole, view);
+  EXPECT_NEAR(seen.noise, 0.004, 1e-12);
+  double square = 0, count = 0;
+  for (std::int64_t f = 0; f < seen.frames; ++f) {
+    for (std::int64_t p = 0; p < 64; ++p) {
+      if (!seen.is_seen(f, p)) continue;
+      for (int k = 0; k < 3; ++k)
+        square += std::pow(seen.positions(f)[3 * p + k] - whole.positions(f)[3 * p + k], 2);
+      count += 3;
+    }
+  }
+  EXPECT_NEAR(count / double(whole.x.size()), 0.75, 0.04);
+  EXPECT_NEAR(std::sqrt(square / count), 0.004, 2e-4);
+  view.says_noise = false;
+  EXPECT_TRUE(std::isnan(laboratory_view(whole, view).noise));
+}
+
+TEST(LaboratoryView, NothingToSeeIsAnError) {
+  LaboratoryView view;
+  view.share = 0.001;
+  EXPECT_THAT(testing::error_of([&] { laboratory_view(moving_box(), view); }),
+              HasSubstr("points.share: expected at least one of 64 points"));
+  view = {};
+  view.stride = 30;
+  EXPECT_THAT(testing::error_of([&] { laboratory_view(moving_box(), view); }),
+              HasSubstr("frames: expected at least two of 0 to 20"));
+}
+
+}  // namespace
+}  // namespace uniphy

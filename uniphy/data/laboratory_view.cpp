@@ -1,0 +1,95 @@
+#include "uniphy/data/laboratory_view.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <string>
+#include <vector>
+
+#include "ops/kernels/base/error.hpp"
+#include "uniphy/geometry/random.hpp"
+
+namespace uniphy {
+namespace {
+
+/// Normal numbers that are the same on every platform (G. Box and M. Muller, Ann. Math. Stat. 29,
+/// 1958).
+double normal(UniformRandom& random) {
+  const double radius = std::sqrt(-2 * std::log(1 - random.unit()));
+  return radius * std::cos(2 * M_PI * random.unit());
+}
+
+/// `count` of the points, in their order.
+std::vector<std::int64_t> drawn_points(std::int64_t points, std::int64_t count,
+                                       UniformRandom& random) {
+  std::vector<std::int64_t> all(static_cast<std::size_t>(points));
+  std::iota(all.begin(), all.end(), std::int64_t{0});
+  for (std::int64_t k = 0; k < count; ++k)
+    std::swap(all[k], all[k + static_cast<std::int64_t>(random.below(points - k))]);
+  all.resize(static_cast<std::size_t>(count));
+  std::sort(all.begin(), all.end());
+  return all;
+}
+
+double size_of(const std::vector<double>& start) {
+  double size = 0;
+  for (int k = 0; k < 3; ++k) {
+    double low = start[k], high = start[k];
+    for (std::size_t i = k; i < start.size(); i += 3) {
+      low = std::min(low, start[i]);
+      high = std::max(high, start[i]);
+    }
+    size = std::max(size, high - low);
+  }
+  return size;
+}
+
+}  // namespace
+
+Observation laboratory_view(const Observation& whole, const LaboratoryView& view) {
+  const std::int64_t last = view.last < 0 ? whole.frames - 1 : view.last;
+  if (last >= whole.frames || view.stride > last) {
+    throw Error(fmt::format("frames: expected at least two of 0 to {}, found every {}th up to {}",
+                            whole.frames - 1, view.stride, last));
+  }
+  const std::int64_t points = whole.points();
+  const auto count = static_cast<std::int64_t>(std::llround(view.share * double(points)));
+  if (count < 1) {
+    throw Error(fmt::format("points.share: expected at least one of {} points, found {}", points,
+                            view.share));
+  }
+  UniformRandom random(view.seed);
+  const std::vector<std::int64_t> kept = drawn_points(points, count, random);
+  Observation o = whole;
+  o.x.clear();
+  o.time.clear();
+  o.frames = 0;
+  if (whole.vertices.empty()) o.body = whole.start();
+  const double size = size_of(whole.vertices.empty() ? whole.start() : whole.vertices);
+  const double noise = view.noise * size;
+  for (std::int64_t f = 0; f <= last; f += view.stride) {
+    for (const std::int64_t p : kept) {
+      const bool hidden = random.unit() < view.hidden;
+      for (int k = 0; k < 3; ++k) {
+        const double x = whole.positions(f)[3 * p + k] + noise * normal(random);
+        o.x.push_back(hidden ? std::numeric_limits<double>::quiet_NaN() : std::clamp(x, 0.0, 1.0));
+      }
+    }
+    o.time.push_back(whole.time[f]);
+    ++o.frames;
+  }
+  o.noise = view.says_noise ? std::hypot(std::isnan(whole.noise) ? 0 : whole.noise, noise)
+                            : std::numeric_limits<double>::quiet_NaN();
+  const bool as_they_are = !whole.tracked() && count == points && view.hidden == 0;
+  if (as_they_are) {
+    o.body.clear();
+  } else {
+    o.tracers.assign(o.x.begin(), o.x.begin() + 3 * count);
+  }
+  return o;
+}
+
+}  // namespace uniphy

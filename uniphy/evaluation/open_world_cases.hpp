@@ -1,0 +1,34 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "uniphy/evaluation/forecast.hpp"
+#include "uniphy/evaluation/outside_scenes.hpp"
+
+namespace uniphy {
+
+/// How the motion of a scene is observed.
+enum class OpenWorldCase {
+  closed,   ///< all particles in all frames, from the simulator, grid and time step of the fit
+  noise,    ///< the same with noise
+  tracked,  ///< a tenth of the particles as tracked points, every tenth frame, with noise
+  hidden,   ///< the same, and a third of their positions hidden
+  finer     ///< all particles, from a grid twice as fine with a quarter of the time step and eight
+            ///< times the particles, of which means of 2×2×2 are seen; a cube alone
+};
+inline constexpr const char* kOpenWorldCases[] = {"closed", "noise", "tracked", "hidden", "finer"};
+const char* case_name(OpenWorldCase c);
+
+struct OpenWorldMotion {
+  JudgedMotion motion;
+  double floor = 0;  ///< forecast_error of the true law with the true initial velocity
+};
+
+/// The law's motion in a scene as a case has it; noise: standard deviation of a coordinate over the
+/// size. Throws Error where the simulation fails, or of `finer` where the body is no lattice that
+/// can be made finer.
+OpenWorldMotion open_world_motion(const OutsideScene& scene, const kernels::LawDescription& law,
+                                  OpenWorldCase c, double noise, std::uint64_t seed);
+
+}  // namespace uniphy

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "ops/kernels/laws/law.hpp"
+
+namespace uniphy {
+
+/// What a law is made of, read off its answers alone, whatever its form: SI units, NaN where the
+/// material has no such number.
+struct MaterialReading {
+  static constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+
+  /// elastic, newtonian (any fluid), plasticine (yields, and all that exceeds flows off within a
+  /// step), sand (bears no shear without pressure) or non_newtonian (yields, and flows at a rate).
+  /// A body that did not yield at the strains that it saw is called elastic.
+  std::string material;
+  double mu = kNone;      ///< Pa, of small shear under slight compression
+  double lambda = kNone;  ///< Pa; of a fluid its bulk modulus
+  double young = kNone, poisson = kNone;
+  double yield_stress = kNone;    ///< Pa, the norm of the deviator of τ without pressure
+  double friction_angle = kNone;  ///< rad, of a cone of Drucker and Prager that touches it
+  double viscosity = kNone;  ///< Pa s, of a fluid dτ/dγ̇ in shear; of a non-Newtonian body η
+  double strain_seen = 0;    ///< largest norm of the deviator of log Σ that counted
+};
+
+/// Probes the law at a time step: small strains, then shear up to `strain_seen` (the norm of the
+/// deviator of log Σ) at pressures down to none, then a rate of shear.
+MaterialReading read_material(const kernels::LawDescription& law, double dt, double strain_seen);
+
+/// The norm of the deviator of log Σ that all but the last per mille of the deformation gradients
+/// F [count, 9] stay below.
+double strain_seen(const std::vector<double>& F);
+
+/// One line a number, with units; "n/a" is left out.
+std::string reading_text(const MaterialReading& reading);
+
+}  // namespace uniphy
