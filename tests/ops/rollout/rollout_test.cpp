@@ -127,6 +127,32 @@ TEST(Rollout, TracersMoveWithTheGridAndChangeNothing) {
   EXPECT_GE((x[-1] - x[0]).slice(0, P).norm(2, 1).min().item<double>(), 1e-2);
 }
 
+TEST(Rollout, TracersHaveNoMassAndComeLast) {
+  TracedScene scene;
+  const LawDescription law = sample_law(LawId::elastic);
+  const std::int64_t P = scene.x.size(0);
+  const auto message = [&](std::vector<RolloutBody> bodies) {
+    try {
+      rollout(scene.x, scene.v, {}, {}, scene.mass, scene.volume, bodies, scene.settings);
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  RolloutBody front, points;
+  front.begin = 0, front.end = P - 1, front.law = law;
+  points.begin = P - 1, points.end = P, points.tracers = true;
+  EXPECT_THAT(message({front, points}),
+              ::testing::HasSubstr("expected mass 0 and volume 0 of particle 124, a tracer"));
+  points.begin = 0, points.end = 1;
+  front.begin = 1, front.end = P;
+  EXPECT_THAT(
+      message({points, front}),
+      ::testing::HasSubstr("expected tracers after all material, found material in body 1"));
+  points.end = P;
+  EXPECT_THAT(message({points}), ::testing::HasSubstr("expected at least one of material"));
+}
+
 TEST(Rollout, GradientsOfTracersAgreeWithCentralDifferences) {
   TracedScene scene;
   const LawDescription law = sample_law(LawId::elastic);

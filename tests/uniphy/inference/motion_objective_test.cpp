@@ -166,6 +166,23 @@ TEST(MotionObjective, TrackedPointsFollowTheBody) {
               1e-12 * expected / count);
 }
 
+TEST(MotionObjective, TrackedPointsStepByStepAreTheSame) {
+  const Problem p(testing::elastic_body());
+  const Observation points = tracked(p.observation);
+  const auto law = testing::elastic_body(3e4, 2e4);
+  const Tensor start = torch::cat({p.velocities(), torch::zeros({points.points(), 3})});
+  std::vector<Tensor> found;
+  for (const char* rollout : {"fused", "stepwise"}) {
+    const Tensor v = start.clone().requires_grad_();
+    make_motion_objective(points, p.steps, p.grid, "float64", rollout)
+        ->mse(p.body(law), v, 20)
+        .backward();
+    found.push_back(v.grad());
+  }
+  EXPECT_GT(found[0].norm().item<double>(), 0);
+  EXPECT_LE(((found[0] - found[1]).norm() / found[0].norm()).item<double>(), 1e-9);
+}
+
 TEST(MotionObjective, FlowGradientsSayHowAStartMovesThePath) {
   const Problem p(testing::elastic_body());
   Observation points = tracked(p.observation);
