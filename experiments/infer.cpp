@@ -62,7 +62,11 @@ void run(const uniphy::ObservationSource& observed, const uniphy::FitVariablesSo
               result.fit.history.size());
   std::fputs(rung_table(result.rung, result.rungs).c_str(), stdout);
   std::fputs(fit_summary(result.fit, *variables).c_str(), stdout);
-  if (result.fit.determined) std::fputs(reading_text(result.reading).c_str(), stdout);
+  if (result.fit.determined) {
+    std::fputs(reading_text(result.reading).c_str(), stdout);
+  } else {
+    out.set_no_answer();
+  }
   std::fflush(stdout);
   for (const std::string& warning : fit_warnings(result, observation, *variables))
     warnings.push_back(warning);
@@ -79,7 +83,9 @@ int main(int argc, char** argv) {
       "Finds the material of an observed object: fits a latent code (or the parameters of a law) "
       "by gradients through the whole simulation, and then as much of the learned law itself as "
       "the "
-      "motion asks for. An interrupted run goes on where it was.",
+      "motion asks for. An interrupted run goes on where it was. Where the observation does not "
+      "determine "
+      "the material, all files are written and the exit code is 3.",
       {"CONFIG.yaml         the observation, what is fitted, the schedule",
        "observation.h5      positions of particles or of tracked points and the body, times and "
        "the "

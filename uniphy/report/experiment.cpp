@@ -164,8 +164,8 @@ class DirectoryLock {
   int file_;
 };
 
-void run(const CommandLine& line, const ExperimentInfo& info, const DeclareFunction& declare,
-         std::chrono::steady_clock::time_point start) {
+int run(const CommandLine& line, const ExperimentInfo& info, const DeclareFunction& declare,
+        std::chrono::steady_clock::time_point start) {
   const Config config = Config::load(line.config, line.overrides);
   Section root = config.root();
   const RunFunction work = declare(root);
@@ -197,6 +197,7 @@ void run(const CommandLine& line, const ExperimentInfo& info, const DeclareFunct
   }
   metrics.add_resources(start);
   metrics.write(out.file(Undo::kMetrics));
+  return out.no_answer() ? kNoAnswer : 0;
 }
 
 }  // namespace
@@ -215,8 +216,7 @@ int run_experiment(int argc, const char* const* argv, const ExperimentInfo& info
       std::fputs(help_text(info, declare).c_str(), stdout);
       return 0;
     }
-    run(line, info, declare, start);
-    return 0;
+    return run(line, info, declare, start);
   } catch (const Interrupted& error) {
     std::fprintf(stderr, "%s\n", error.what());
     return 130;

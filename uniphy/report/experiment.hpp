@@ -47,12 +47,18 @@ class RunDirectory {
   const std::string& config_yaml() const { return config_yaml_; }
   /// OpenMP threads of this run (already set for OpenMP).
   int threads() const { return threads_; }
+  /// Says that the run did all it could and wrote its products, and yet has no answer: its exit
+  /// code is kNoAnswer.
+  void set_no_answer() { no_answer_ = true; }
+  bool no_answer() const { return no_answer_; }
 
  private:
   std::filesystem::path root_;
   std::string config_yaml_;
   int threads_;
+  bool no_answer_ = false;
 };
+inline constexpr int kNoAnswer = 3;
 
 /// The second phase: does the work.
 using RunFunction = std::function<void(RunDirectory& out, Metrics& metrics)>;
@@ -60,8 +66,8 @@ using RunFunction = std::function<void(RunDirectory& out, Metrics& metrics)>;
 /// --help it runs without a document (config.describing() is true) and its result is dropped.
 using DeclareFunction = std::function<RunFunction(Section& config)>;
 
-/// Returns the exit code: 0, 1 after `error: ...` on stderr, 130 when interrupted. Without --out
-/// the directory is out/<name without uniphy_>/<stem of CONFIG>.
+/// Returns the exit code: 0, 1 after `error: ...` on stderr, kNoAnswer, 130 when interrupted.
+/// Without --out the directory is out/<name without uniphy_>/<stem of CONFIG>.
 int run_experiment(int argc, const char* const* argv, const ExperimentInfo& info,
                    const DeclareFunction& declare);
 

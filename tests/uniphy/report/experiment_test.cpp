@@ -44,6 +44,7 @@ RunFunction add(Section& config) {
     if (a + b < -1000) throw std::runtime_error("not even an Error");
     write_text_file(out.file("sum.txt"), std::to_string(a + b));
     metrics.set("sum", a + b);
+    if (a + b == 777) out.set_no_answer();
     metrics.set("threads", out.threads());
   };
 }
@@ -85,6 +86,13 @@ TEST(Experiment, WritesProductResolvedConfigurationAndMetrics) {
   // The resolved configuration is a configuration: the run can be repeated from it.
   EXPECT_EQ(run(scratch, {"@/new/out/config.yaml", "--out", "@/again"}).code, 0);
   EXPECT_EQ(read_text_file(scratch.file("again/sum.txt")), "7.000000");
+}
+
+TEST(Experiment, ARunWithoutAnAnswerWritesAllAndHasACodeOfItsOwn) {
+  const testing::Scratch scratch;
+  write_text_file(scratch.file("c.yaml"), "b: 776\n");
+  EXPECT_EQ(run(scratch, {"@/c.yaml", "--out", "@/out"}).code, kNoAnswer);
+  EXPECT_EQ(Metrics::read(scratch.file("out/metrics.json")).find("sum"), 777);
 }
 
 TEST(Experiment, OptionsMayComeInAnyOrderAndRepeat) {
