@@ -250,6 +250,7 @@ class Ladder {
   void finish(const Climber& best) {
     const std::string task = "all frames";
     const Rung rung = result_.rung;
+    const RigidMotion before = fitter_.motion();
     Climber last = best;
     last.point =
         rung == Rung::weights
@@ -257,7 +258,10 @@ class Ladder {
                               std::max(1, adaptation_.epochs / kLastShare))
             : fitter_.least_squares(observation_, observation_.frames, rung, best.point,
                                     {best.point, least_pull()}, task, kLastIterations, true);
-    if (rung != Rung::latent && !fitter_.lasts(last.point, rung)) last.point = best.point;
+    if (rung != Rung::latent && !fitter_.lasts(last.point, rung)) {
+      last.point = best.point;
+      fitter_.set_motion(before);
+    }
     if (fits_starts_ && rung != Rung::weights)
       move_starts(rung, last.point, Observation(observation_));
     result_.seen = observation_;

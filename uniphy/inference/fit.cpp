@@ -62,7 +62,8 @@ class Fit {
   /// Roll-outs of a candidate in a stage, at most.
   std::int64_t most_work(const FitStage& stage) const {
     if (stage.optimizer != kLevenbergMarquardt) return stage.epochs;
-    return std::int64_t(stage.epochs) * (variables_.size() + LevenbergMarquardt::kTrials);
+    return std::int64_t(stage.epochs) *
+           (variables_.size() + FitProblem::kMotion + LevenbergMarquardt::kTrials);
   }
 
   /// Saves where it is time to, tells the user, and stops where the user asked for it.

@@ -25,7 +25,7 @@ constexpr double kPressed = 0.02, kUnpressed = 1e-6;
 /// kPressed is sand: of a von Mises solid it is 1.
 constexpr double kSandShare = 0.2;
 /// Share of what exceeds the yield strain that is left after a step, from which a flow has a rate.
-/// Trained plasticine leaves less than a hundredth.
+/// A choice: the two families meet where a non-Newtonian body's viscosity is small.
 constexpr double kFlowShare = 0.03;
 /// 1/s, of shear.
 constexpr double kRate = 10;

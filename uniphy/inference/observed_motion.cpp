@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <Eigen/Cholesky>
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -26,8 +25,7 @@ using Eigen::Vector3d;
 constexpr std::int64_t kMaximumSteps = 10000000;  ///< of an observation
 constexpr double kContactCells = 0.01;  ///< off the free flight, in cells, where a wall acts
 
-/// Noise over size below which one frame tells the velocity: it would be off by less than a
-/// thousandth of a size a frame.
+/// Noise over size below which one frame tells the velocity. A choice.
 constexpr double kLittleNoise = 1e-4;
 
 /// Time of a frame in steps.
@@ -130,15 +128,11 @@ Vector3d centre_of(const Observation& observation, const double* x) {
 bool reaches_wall(const Observation& observation, const ObservedSteps& steps,
                   const kernels::GridSettings& grid, const RigidMotion& motion,
                   std::ptrdiff_t frame) {
-  const double t = steps_to(steps, frame) * grid.dt, speed = motion.angular.norm();
-  const Vector3d axis = speed > 0 ? Vector3d(motion.angular / speed) : Vector3d::UnitX();
-  const Eigen::Matrix3d R = Eigen::AngleAxisd(speed * t, axis).toRotationMatrix();
-  const Vector3d centre = motion.centre + t * motion.linear + fall(grid, steps, frame);
+  const Eigen::Isometry3d pose = flight_pose(steps, grid, motion, frame);
   const double low = grid.bound + 0.5, high = grid.n - grid.bound - 0.5;  // in cells
   const std::vector<double> start = observation.start();
   for (std::int64_t p = 0; p < observation.particles; ++p) {
-    const Vector3d x =
-        grid.n * (centre + R * (Map<const Vector3d>(start.data() + 3 * p) - motion.centre));
+    const Vector3d x = grid.n * (pose * Map<const Vector3d>(start.data() + 3 * p));
     if (!((x.array() >= low).all() && (x.array() < high).all())) return true;
   }
   return false;
@@ -181,6 +175,15 @@ void fit_motion(const Observation& observation, const Flight& flight, bool linea
 }
 
 }  // namespace
+
+Eigen::Isometry3d flight_pose(const ObservedSteps& steps, const kernels::GridSettings& grid,
+                              const RigidMotion& motion, std::ptrdiff_t frame) {
+  const double t = steps_to(steps, frame) * grid.dt, speed = motion.angular.norm();
+  const Vector3d axis = speed > 0 ? Vector3d(motion.angular / speed) : Vector3d::UnitX();
+  const Vector3d moved = t * motion.linear + fall(grid, steps, frame);
+  return Eigen::Translation3d(motion.centre + moved) * Eigen::AngleAxisd(speed * t, axis) *
+         Eigen::Translation3d(-motion.centre);
+}
 
 bool is_complete(const Observation& observation) {
   return !observation.tracked() && std::none_of(observation.x.begin(), observation.x.end(),

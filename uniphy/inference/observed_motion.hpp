@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Geometry>
 #include <string>
 #include <vector>
 
@@ -63,6 +64,10 @@ RigidMotion observed_motion(const Observation& observation, const ObservedSteps&
 /// rad. The rotation of a body without stress, which the positions are compared with, is off by
 /// ½ kFlightAngle² of a radius at its end.
 inline constexpr double kFlightAngle = 0.2;
+
+/// Where a rigid body in free flight is at a frame: its pose there over that at the first one.
+Eigen::Isometry3d flight_pose(const ObservedSteps& steps, const kernels::GridSettings& grid,
+                              const RigidMotion& motion, std::ptrdiff_t frame);
 
 /// The first frame at which a wall acts; the number of frames where that never happens. Of a
 /// complete observation it is where the centre of mass has left the parabola of free flight by more

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <torch/torch.h>
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -17,26 +16,14 @@ using Eigen::Map;
 using Eigen::Vector3d;
 using torch::Tensor;
 
-/// Where a point of a rigid body in free flight was at the first frame, which stands at x at a
-/// later one.
-Vector3d flown_back(const Observation& o, const kernels::GridSettings& grid,
-                    const RigidMotion& motion, std::int64_t frame, const Vector3d& x) {
-  const double t = o.time[frame] - o.time[0], speed = motion.angular.norm();
-  const Vector3d fall = 0.5 * t * (t + grid.dt) * Map<const Vector3d>(grid.gravity);
-  const Vector3d arm = x - (motion.centre + t * motion.linear + fall);
-  if (speed == 0) return motion.centre + arm;
-  return motion.centre +
-         Eigen::AngleAxisd(-speed * t, Vector3d(motion.angular / speed)).toRotationMatrix() * arm;
-}
-
 /// The start of a point that the first frame hides.
-std::optional<Vector3d> hidden_start(const Observation& o, const kernels::GridSettings& grid,
-                                     const RigidMotion& motion, std::int64_t contact,
-                                     std::int64_t point) {
+std::optional<Vector3d> hidden_start(const Observation& o, const ObservedSteps& steps,
+                                     const kernels::GridSettings& grid, const RigidMotion& motion,
+                                     std::int64_t contact, std::int64_t point) {
   for (std::int64_t f = 1; f < std::min(contact + 1, o.frames); ++f) {
     if (!o.is_seen(f, point)) continue;
-    const Vector3d x =
-        flown_back(o, grid, motion, f, Map<const Vector3d>(o.positions(f) + 3 * point));
+    const Vector3d x = flight_pose(steps, grid, motion, f).inverse() *
+                       Map<const Vector3d>(o.positions(f) + 3 * point);
     if ((x.array() >= 0).all() && (x.array() <= 1).all()) return x;
     return {};
   }
@@ -93,7 +80,7 @@ Observation with_known_starts(const Observation& observation, const std::string&
   std::vector<std::int64_t> kept;
   for (std::int64_t p = 0; p < points; ++p) {
     std::optional<Vector3d> start = Vector3d(Map<const Vector3d>(o.tracers.data() + 3 * p));
-    if (start->hasNaN()) start = hidden_start(o, grid, motion, contact, p);
+    if (start->hasNaN()) start = hidden_start(o, steps, grid, motion, contact, p);
     if (!start) continue;
     kept.push_back(p);
     tracers.insert(tracers.end(), start->data(), start->data() + 3);
