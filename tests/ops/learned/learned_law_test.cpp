@@ -1,16 +1,12 @@
 // The learned law's op against its plain-tensor reference and against central differences.
 
-#include "ops/learned/learned_law.hpp"
+#include "ops/reference/learned_law.hpp"
 
 #include <gtest/gtest.h>
 #include <omp.h>
 #include <torch/torch.h>
 
-#include <random>
-#include <tuple>
-
-#include "ops/reference/learned_law.hpp"
-#include "tests/support/deformation_tensors.hpp"
+#include "tests/ops/learned/learned_law_op.hpp"
 #include "tests/support/error_of.hpp"
 #include "tests/support/law_cases.hpp"
 #include "tests/support/random_weights.hpp"
@@ -24,8 +20,6 @@ using testing::generic_deformations;
 using testing::relative;
 using testing::tensor_of;
 using torch::Tensor;
-
-constexpr double kStressUnit = 1e4;
 
 /// One tensor for each group of the gradient table, without the states whose singular values are
 /// closer than `gap`.
@@ -59,24 +53,6 @@ Gradients gradients(const LawOutput& out, const Tensor& F, const Tensor& C, cons
   const auto g = torch::autograd::grad({loss}, {F, C, z});
   return {g[0], g[1], g[2]};
 }
-
-using Parameters = std::tuple<LawForm, Activation, int>;
-class LearnedLawOp : public ::testing::TestWithParam<Parameters> {
- protected:
-  LawForm form() const { return std::get<0>(GetParam()); }
-  LearnedNetworks networks(unsigned seed = 7) const {
-    const auto [form, activation, hidden] = GetParam();
-    return to_networks(testing::random_weights(form, 5, 20, hidden, activation, seed),
-                       torch::kFloat64);
-  }
-  static Tensor latent(torch::Dtype dtype = torch::kFloat64) {
-    return torch::tensor({0.3, -0.2, 0.5, -0.7, 0.1}, torch::kFloat64).to(dtype);
-  }
-  static Tensor rates(const Tensor& F) {
-    torch::manual_seed(17);
-    return 8 * torch::randn_like(F);
-  }
-};
 
 TEST_P(LearnedLawOp, FollowsItsReference) {
   const LearnedNetworks w = networks();
@@ -140,140 +116,6 @@ TEST_P(LearnedLawOp, GradientsMatchCentralDifferences) {
   compare("C", (g.C * dC).sum({1, 2}), 1e-3, [&](double s) { return losses(F, C + s * dC, z); });
   compare("z", (g.z * dz).sum().reshape({1}), 1e-6,
           [&](double s) { return losses(F, C, z + s * dz).sum().reshape({1}); });
-}
-
-/// Gradients by the numbers of both networks, as in gradients().
-std::vector<Tensor> weight_gradients(const LearnedNetworks& w, const Tensor& F, const Tensor& C,
-                                     const Tensor& z) {
-  LearnedNetworks leaf = w;
-  leaf.projection.numbers = w.projection.numbers.detach().clone().requires_grad_();
-  leaf.stress.numbers = w.stress.numbers.detach().clone().requires_grad_();
-  const LawOutput out = learned_law(leaf, F, C, z);
-  torch::manual_seed(5);
-  const Tensor G = torch::randn(F.sizes(), torch::kFloat64).to(F.scalar_type());
-  const Tensor S = torch::randn(F.sizes(), torch::kFloat64).to(F.scalar_type());
-  const Tensor loss = (G * out.F_proj).sum() + (S * out.tau).sum() / kStressUnit;
-  return torch::autograd::grad({loss}, {leaf.projection.numbers, leaf.stress.numbers});
-}
-
-/// The same networks with nothing but z in the first layers of those named.
-LearnedNetworks blind(const LearnedNetworks& w, bool projection, bool stress) {
-  LearnedNetworks r = w;
-  const kernels::NetworkShape shape = kernels::network_shape(w.form);
-  const auto clear = [](FlatLayers& layers, int features) {
-    layers.numbers = layers.numbers.clone();
-    layers_of(layers)[0].weight.narrow(1, 0, features).zero_();
-  };
-  if (projection) clear(r.projection, shape.projection_in);
-  if (stress) clear(r.stress, shape.stress_in);
-  r.cache = make_kernel_weights_cache();
-  return r;
-}
-
-void expect_weight_gradients(const LearnedNetworks& w, const Tensor& every_F, const Tensor& every_C,
-                             const Tensor& z) {
-  const torch::NoGradGuard guard;
-  torch::manual_seed(5);
-  Tensor G = torch::randn(every_F.sizes(), torch::kFloat64);
-  Tensor S = torch::randn(every_F.sizes(), torch::kFloat64);
-  Tensor F = every_F, C = every_C;
-  for (int repeat = 0; repeat < 3; ++repeat) {
-    const Tensor of_projection = torch::randn_like(w.projection.numbers);
-    const Tensor of_stress = torch::randn_like(w.stress.numbers);
-    for (const bool projection : {true, false}) {
-      SCOPED_TRACE(projection ? "projection" : "stress");
-      const auto losses = [&](double step) {
-        LearnedNetworks moved = w;
-        FlatLayers& layers = projection ? moved.projection : moved.stress;
-        layers.numbers = layers.numbers + step * (projection ? of_projection : of_stress);
-        const LawOutput out = learned_law(moved, F, C, z);
-        return ((G * out.F_proj) + (S * out.tau) / kStressUnit).sum({1, 2});  // [P]
-      };
-      const auto difference = [&](double h) {
-        return (8 * (losses(h) - losses(-h)) - (losses(2 * h) - losses(-2 * h))) / (12 * h);
-      };
-      const Tensor fine = difference(1e-5), coarse = difference(3e-5);
-      // Particles with a kink of the caps in the stencil are left out, and few may be.
-      const Tensor smooth = (fine - coarse).abs() <= 1e-6 * (fine.abs() + 1e-2);
-      EXPECT_GE(smooth.sum().item<int64_t>(), fine.numel() * 9 / 10);
-      const Tensor weight = smooth.to(torch::kFloat64).view({-1, 1, 1});
-      LearnedNetworks leaf = w;
-      leaf.projection.numbers = w.projection.numbers.clone().requires_grad_();
-      leaf.stress.numbers = w.stress.numbers.clone().requires_grad_();
-      const torch::AutoGradMode on(true);
-      const LawOutput out = learned_law(leaf, F, C, z);
-      const Tensor loss = (weight * (G * out.F_proj + S * out.tau / kStressUnit)).sum();
-      const auto g = torch::autograd::grad({loss}, {leaf.projection.numbers, leaf.stress.numbers});
-      const double found = projection ? (g[0] * of_projection).sum().item<double>()
-                                      : (g[1] * of_stress).sum().item<double>();
-      const double expected = fine.masked_select(smooth).sum().item<double>();
-      EXPECT_NE(expected, 0);
-      EXPECT_NEAR(found, expected, 1e-6 * fine.masked_select(smooth).norm().item<double>());
-    }
-  }
-}
-
-TEST_P(LearnedLawOp, WeightGradientsMatchCentralDifferences) {
-  const LearnedNetworks w = networks();
-  const Tensor F = generic_deformations(300, 0.3, 6), C = rates(F), z = latent();
-  expect_weight_gradients(w, F, C, z);
-  if (form() == LawForm::published) return;
-  // Networks of z alone: their weights of the state features are zero, the gradients are not.
-  for (const bool both : {false, true}) {
-    SCOPED_TRACE(both ? "both of z alone" : "projection of z alone");
-    expect_weight_gradients(blind(w, true, both), F, C, z);
-  }
-}
-
-TEST_P(LearnedLawOp, WeightGradientsHaveTheSameBitsTogetherApartAndOnEveryThreadCount) {
-  const LearnedNetworks w = networks();
-  const Tensor F = generic_deformations(3000, 0.2, 12).requires_grad_();
-  const Tensor C = rates(F).requires_grad_(), z = latent().requires_grad_();
-  LearnedNetworks leaf = w;
-  leaf.projection.numbers = w.projection.numbers.clone().requires_grad_();
-  leaf.stress.numbers = w.stress.numbers.clone().requires_grad_();
-  const auto run = [&](const std::vector<Tensor>& leaves) {
-    const LawOutput out = learned_law(leaf, F, C, z);
-    return torch::autograd::grad({out.F_proj.square().sum() + out.tau.sum() / kStressUnit}, leaves);
-  };
-  const std::vector<Tensor> all{F, C, z, leaf.projection.numbers, leaf.stress.numbers};
-  const int threads = omp_get_max_threads();
-  omp_set_num_threads(1);
-  const auto one = run(all);
-  omp_set_num_threads(2);
-  const auto two = run(all);
-  for (std::size_t k = 0; k < all.size(); ++k) {
-    EXPECT_TRUE(torch::equal(one[k], two[k])) << k;
-    EXPECT_TRUE(torch::equal(run({all[k]})[0], two[k])) << k;
-  }
-  omp_set_num_threads(threads);
-}
-
-TEST_P(LearnedLawOp, WeightGradientsOfTheHalvesAreThoseOfTheWhole) {
-  const LearnedNetworks w = networks();
-  const Tensor F = generic_deformations(70, 0.3, 8), C = rates(F), z = latent();
-  LearnedNetworks leaf = w;
-  leaf.projection.numbers = w.projection.numbers.clone().requires_grad_();
-  leaf.stress.numbers = w.stress.numbers.clone().requires_grad_();
-  const Tensor F_proj = learned_project(leaf, F, z), tau = learned_stress(leaf, F_proj, C, z);
-  torch::manual_seed(5);
-  const Tensor G = torch::randn(F.sizes(), torch::kFloat64);
-  const Tensor S = torch::randn(F.sizes(), torch::kFloat64);
-  const auto halves = torch::autograd::grad({(G * F_proj).sum() + (S * tau).sum() / kStressUnit},
-                                            {leaf.projection.numbers, leaf.stress.numbers});
-  const auto whole = weight_gradients(w, F, C, z);
-  for (int k : {0, 1})
-    EXPECT_LE(relative(halves[k], whole[k]), form() == LawForm::published ? 1e-7 : 1e-10) << k;
-  // What one half does not use stays undefined.
-  const auto unused =
-      torch::autograd::grad({learned_stress(leaf, F, C, z).sum()},
-                            {leaf.projection.numbers, leaf.stress.numbers}, {}, c10::nullopt, false,
-                            /*allow_unused=*/true);
-  EXPECT_FALSE(unused[0].defined());
-  EXPECT_TRUE(unused[1].defined());
-  EXPECT_FALSE(learned_law(w, F, C, z).tau.requires_grad());
-  const torch::NoGradGuard off;
-  EXPECT_FALSE(learned_law(leaf, F, C, z).tau.requires_grad());
 }
 
 TEST_P(LearnedLawOp, ItsTwoHalvesAreTheWhole) {
@@ -386,19 +228,7 @@ TEST_P(LearnedLawOp, ReferenceTakesALatentForEachParticle) {
   }
 }
 
-std::string parameter_name(const ::testing::TestParamInfo<Parameters>& info) {
-  return std::string(kernels::form_name(std::get<0>(info.param))) + "_" +
-         kernels::activation_name(std::get<1>(info.param)) + "_" +
-         std::to_string(std::get<2>(info.param));
-}
-INSTANTIATE_TEST_SUITE_P(All, LearnedLawOp,
-                         ::testing::Values(Parameters{LawForm::isotropic, Activation::gelu, 3},
-                                           Parameters{LawForm::isotropic, Activation::silu, 2},
-                                           Parameters{LawForm::isotropic, Activation::squareplus,
-                                                      1},
-                                           Parameters{LawForm::published, Activation::gelu, 2},
-                                           Parameters{LawForm::published, Activation::silu, 0}),
-                         parameter_name);
+INSTANTIATE_TEST_SUITE_P(All, LearnedLawOp, learned_law_cases(), learned_law_case);
 
 TEST(LearnedLawOpErrors, NameTheArgument) {
   const LearnedNetworks w = to_networks(
@@ -440,22 +270,6 @@ TEST(LearnedLawOpErrors, NameTheArgument) {
       spoilt([](LearnedNetworks& n) { n.stress.numbers = n.stress.numbers.to(torch::kFloat64); }),
       "learned law: networks.stress.numbers: expected [214] Float on cpu, found [214] Double "
       "on cpu");
-}
-
-TEST(LearnedLawOpCache, SeesEveryChangeOfTheNumbers) {
-  const LearnedNetworks w = to_networks(
-      testing::random_weights(LawForm::isotropic, 4, 8, 1, Activation::silu, 1), torch::kFloat64);
-  const Tensor F = generic_deformations(5, 0.2, 3), C = torch::zeros_like(F);
-  const Tensor z = torch::zeros({4}, torch::kFloat64);
-  EXPECT_EQ(kernel_weights(w), kernel_weights(w));
-  EXPECT_EQ(kernel_weights(w)->packed<double>(), kernel_weights(w)->packed<double>());
-  const auto before = kernel_weights(w);
-  const Tensor tau = learned_law(w, F, C, z).tau;
-  w.stress.numbers.data_ptr<double>()[w.stress.numbers.numel() - 8] += 1;  // counts no version
-  EXPECT_NE(kernel_weights(w), before);
-  EXPECT_FALSE(torch::equal(learned_law(w, F, C, z).tau, tau));
-  w.stress.numbers.data_ptr<double>()[w.stress.numbers.numel() - 8] -= 1;
-  EXPECT_LE(relative(learned_law(w, F, C, z).tau, tau), 1e-12);
 }
 
 }  // namespace
