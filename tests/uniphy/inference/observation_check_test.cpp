@@ -90,7 +90,9 @@ TEST(ObservationCheck, NoRigidStartIsDoubted) {
         for (const Observation& seen : {o, with_noise(o, 1e-3), with_noise(o, 5e-3)}) {
           const ObservationCheck found = check(seen);
           EXPECT_FALSE(start_warning(found).has_value()) << *start_warning(found);
-          if (centre == 0.5) EXPECT_GE(found.free_frames, 1);
+          if (centre == 0.5) {
+            EXPECT_GE(found.free_frames, 1);
+          }
         }
       }
     }
