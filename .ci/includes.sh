@@ -3,8 +3,6 @@
 # headers of its own layer and of lower ones, never of a higher one. A file belongs to the first
 # line that is a prefix of its path. Beyond that:
 #   - ops/kernels and the folders of uniphy that are built without torch include no torch;
-#   - uniphy/io, files in plain vectors that know no torch, no stage and no YAML, is all that models
-#     sees of uniphy;
 #   - only uniphy/config reads YAML;
 #   - ops/reference, which tests and the bench compare with, is included by nobody else;
 #   - experiments, the mains, are included by nobody at all.
@@ -13,7 +11,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 git grep -n '^ *# *include *[<"]' -- '*.hpp' '*.cpp' '*.h' | awk -F: '
   BEGIN {
-    count = split("ops/kernels/ ops/ uniphy/io/ models/ uniphy/config/ uniphy/report/ " \
+    count = split("ops/kernels/ ops/ models/ uniphy/io/ uniphy/config/ uniphy/report/ " \
                   "uniphy/geometry/ uniphy/scene/ uniphy/data/ uniphy/training/ " \
                   "uniphy/inference/ uniphy/evaluation/ uniphy/identify/ uniphy/bench/ " \
                   "experiments/ tests/", layer, " ")

@@ -10,6 +10,7 @@
 #include "models/script_check.hpp"
 #include "models/torchscript.hpp"
 #include "ops/kernels/base/error.hpp"
+#include "uniphy/io/atomic_file.hpp"
 #include "uniphy/io/model_file.hpp"
 #include "uniphy/report/experiment.hpp"
 
@@ -73,9 +74,10 @@ int main(int argc, char** argv) {
           const uniphy::ModelFile model = uniphy::read_model(options.model);
           const bool single = options.dtype == "float32";
           const auto law = out.file("law.pt"), weights = out.file("weights.h5");
-          uniphy::models::save_script_law(law, model.weights,
-                                          single ? torch::kFloat32 : torch::kFloat64,
-                                          {model.latents, model.materials, model.parameters});
+          uniphy::write_text_file(law,
+                                  uniphy::models::script_law_bytes(
+                                      model.weights, single ? torch::kFloat32 : torch::kFloat64,
+                                      {model.latents, model.materials, model.parameters}));
           uniphy::write_model(weights, model, single);
           uniphy::read_model(weights);
           metrics.set("parameters", parameter_count(model.weights));

@@ -8,11 +8,8 @@
 #include "models/torchscript_names.hpp"
 #include "models/torchscript_source.hpp"
 #include "ops/kernels/base/error.hpp"
-#include "uniphy/io/atomic_file.hpp"
 
 namespace uniphy::models {
-
-namespace fs = std::filesystem;
 
 namespace {
 
@@ -94,8 +91,8 @@ torch::jit::Module script_law(const kernels::LearnedLawWeights& weights, torch::
   return module;
 }
 
-void save_script_law(const fs::path& file, const kernels::LearnedLawWeights& weights,
-                     torch::Dtype dtype, const ScriptCodes& codes) {
+std::string script_law_bytes(const kernels::LearnedLawWeights& weights, torch::Dtype dtype,
+                             const ScriptCodes& codes) {
   const torch::jit::Module module = script_law(weights, dtype, codes);
   const nlohmann::json metadata = {
       {"format", kScriptFormat},
@@ -113,10 +110,9 @@ void save_script_law(const fs::path& file, const kernels::LearnedLawWeights& wei
         {"project", "F [P, 3, 3], z [Z] or [P, Z], dt (s, of the time step) -> F_proj [P, 3, 3]"},
         {"stress",
          "F_proj [P, 3, 3], C [P, 3, 3] in 1/s, z -> Kirchhoff stress [P, 3, 3] in Pa"}}}};
-  // To memory first: LibTorch's own file writer ends the program where the disk is full.
   std::ostringstream bytes;
   module.save(bytes, {{"metadata.json", metadata.dump(2)}});
-  write_text_file(file, bytes.str());
+  return bytes.str();
 }
 
 }  // namespace uniphy::models

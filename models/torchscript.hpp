@@ -78,9 +78,10 @@ struct ScriptCodes {
 torch::jit::Module script_law(const kernels::LearnedLawWeights& weights, torch::Dtype dtype,
                               const ScriptCodes& codes = {});
 
-/// Writes `<file>.tmp` and renames it.
-void save_script_law(const std::filesystem::path& file, const kernels::LearnedLawWeights& weights,
-                     torch::Dtype dtype, const ScriptCodes& codes = {});
+/// The bytes of its file, made in memory: LibTorch's own file writer ends the program where the
+/// disk is full.
+std::string script_law_bytes(const kernels::LearnedLawWeights& weights, torch::Dtype dtype,
+                             const ScriptCodes& codes = {});
 
 /// A loaded law whose attributes, methods and buffers were checked.
 struct ScriptLaw {

@@ -1,4 +1,4 @@
-// The learned law as a torch module, its latent codes, and both in a file.
+// The learned law as a torch module and its latent codes.
 
 #include "models/learned_law.hpp"
 
@@ -10,8 +10,8 @@
 #include <cmath>
 #include <string>
 
+#include "models/latent_codes.hpp"
 #include "models/script_check.hpp"
-#include "models/trained_model.hpp"
 #include "ops/kernels/base/error.hpp"
 #include "ops/reference/learned_law.hpp"
 #include "tests/support/error_of.hpp"
@@ -233,49 +233,17 @@ INSTANTIATE_TEST_SUITE_P(Forms, LearnedLawModule,
                          ::testing::Values(LawForm::isotropic, LawForm::published),
                          [](const auto& info) { return kernels::form_name(info.param); });
 
-TEST(TrainedModel, GoesThroughAModelFile) {
-  MaterialParameters sand = no_parameters(), elastic = no_parameters();
-  sand[0] = 1e5;
-  sand[3] = 0.3;
-  elastic[1] = 2e5;
-  TrainedModel model;
-  model.law = random_law(options(LawForm::isotropic));
-  torch::manual_seed(11);
-  model.codes =
-      LatentCodes(torch::randn({3, 5}), std::vector<std::string>{"sand", "elastic", "sand"},
-                  std::vector<MaterialParameters>{sand, elastic, sand});
-  EXPECT_EQ(model.codes->size(), 3);
-  EXPECT_EQ(model.codes->latent_size(), 5);
-  EXPECT_TRUE(model.codes->z.requires_grad());
-  const ModelFile file = model_file(model, "seed: 1\n", {1e-4, 2e-4});
-  EXPECT_EQ(file.training_dt, (std::array<double, 2>{1e-4, 2e-4}));
-  EXPECT_EQ(file.config, "seed: 1\n");
-  const TrainedModel again = trained_model(file);
-  EXPECT_TRUE(torch::equal(again.codes->z, model.codes->z));
-  EXPECT_EQ(again.codes->materials(), model.codes->materials());
-  EXPECT_EQ(again.codes->material_parameters()[1][1], 2e5);
-  for (std::size_t k = 0; k < 2; ++k)
-    EXPECT_TRUE(torch::equal(again.law->parameters()[k], model.law->parameters()[k]));
-}
-
 TEST(LatentCodes, RefuseTablesOfDifferentLength) {
   EXPECT_EQ(testing::error_of([] {
               LatentCodes codes(torch::zeros({2, 4}), std::vector<std::string>{"sand", "elastic"},
-                                std::vector<MaterialParameters>{no_parameters()});
+                                std::vector<CodeParameters>{CodeParameters{}});
             }),
             "latent codes: parameters: expected 2 rows, one for each code, found 1");
   EXPECT_EQ(testing::error_of([] {
               LatentCodes codes(torch::zeros({1, 4}), std::vector<std::string>{},
-                                std::vector<MaterialParameters>{no_parameters()});
+                                std::vector<CodeParameters>{CodeParameters{}});
             }),
             "latent codes: materials: expected 1 rows, one for each code, found 0");
-  ModelFile file;
-  file.weights.latent_size = 3;
-  file.materials = {"sand"};
-  file.parameters = {no_parameters()};
-  file.latents = {1, 2};
-  EXPECT_EQ(testing::error_of([&] { LatentCodes{file}; }),
-            "latent codes: expected 3 numbers, found 2");
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "models/torchscript.hpp"
+#include "uniphy/io/atomic_file.hpp"
 
 namespace uniphy::models {
 
@@ -28,6 +29,13 @@ class ScriptFiles : public ::testing::Test {
  private:
   std::filesystem::path directory_;
 };
+
+/// As uniphy_export writes it.
+inline void save_script_law(const std::filesystem::path& file,
+                            const kernels::LearnedLawWeights& weights, torch::Dtype dtype,
+                            const ScriptCodes& codes = {}) {
+  write_text_file(file, script_law_bytes(weights, dtype, codes));
+}
 
 /// Three codes of two materials.
 inline ScriptCodes some_codes(int latent_size) {

@@ -16,6 +16,7 @@
 #include "uniphy/evaluation/step_budget.hpp"
 #include "uniphy/io/atomic_file.hpp"
 #include "uniphy/training/heldout_fit.hpp"
+#include "uniphy/training/trained_model_file.hpp"
 #include "uniphy/training/training_report.hpp"
 
 namespace uniphy {
@@ -94,8 +95,7 @@ Metrics make(const AblationVariant& variant, const AblationOptions& o, const Hel
   const LawColumns heldout_columns = law_columns(heldout.data, training.law.form);
   const TrainingResult result = train(data, training, out.file("checkpoint.pt"), &heldout_columns);
   const models::TrainedModel& model = result.model;
-  write_model(out.file("model.h5"), models::model_file(model, out.config_yaml(), time_steps(data)),
-              true);
+  write_model(out.file("model.h5"), model_file(model, out.config_yaml(), time_steps(data)), true);
   write_training_curves(out, result.history);
   Metrics metrics;
   metrics.set("parameters", double(model.law->parameter_count()));

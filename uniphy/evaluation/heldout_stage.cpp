@@ -15,6 +15,7 @@
 #include "uniphy/evaluation/heldout_report.hpp"
 #include "uniphy/io/atomic_file.hpp"
 #include "uniphy/training/heldout_fit.hpp"
+#include "uniphy/training/trained_model_file.hpp"
 
 namespace uniphy {
 namespace {
@@ -131,7 +132,7 @@ void run(const HeldoutOptions& o, RunDirectory& out, Metrics& metrics) {
     throw Error(o.model.string() + ": expected latent codes to start the fits from, found none");
   }
   const auto weights = std::make_shared<const kernels::LearnedLawWeights>(model.weights);
-  const models::TrainedModel trained = models::trained_model(model);
+  const models::TrainedModel trained = trained_model(model);
   Stopwatch watch(metrics);
   std::vector<EvaluatedSet> sets;
   double failed = 0;

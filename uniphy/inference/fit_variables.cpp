@@ -9,7 +9,7 @@
 #include <string>
 #include <utility>
 
-#include "models/trained_model.hpp"
+#include "models/learned_law.hpp"
 #include "ops/kernels/base/error.hpp"
 #include "ops/kernels/laws/law_parameters.hpp"
 #include "uniphy/data/material_ranges.hpp"
@@ -27,11 +27,10 @@ class LatentFitVariables : public FitVariables {
  public:
   explicit LatentFitVariables(const ModelFile& file) : training_dt_(file.training_dt) {
     if (file.codes() == 0) throw Error("model: expected latent codes to start from, found none");
-    const models::TrainedModel model = models::trained_model(file, torch::kFloat64);
-    law_ = model.law->frozen();
-    materials_ = model.codes->materials();
+    law_ = models::LearnedLaw(file.weights, torch::kFloat64)->frozen();
+    materials_ = file.materials;
     const auto codes = static_cast<int>(materials_.size());
-    const torch::Tensor z = model.codes->z.detach();
+    const torch::Tensor z = to_tensor(file.latents).view({codes, file.weights.latent_size});
     mean_ = z.mean(0);
     const torch::Tensor spread = z.std(0, /*unbiased=*/false);
     spread_ = torch::where(spread > 0, spread, torch::ones_like(spread));

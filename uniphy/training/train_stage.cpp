@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "uniphy/training/heldout_fit.hpp"
+#include "uniphy/training/trained_model_file.hpp"
 #include "uniphy/training/training_options.hpp"
 #include "uniphy/training/training_report.hpp"
 
@@ -47,8 +48,7 @@ RunFunction train_stage(Section& config) {
     metrics.set("train_s", result.seconds);
     metrics.set("parameters", double(model.law->parameter_count()));
     metrics.set("loss", result.history.back().loss);
-    write_model(out.file("model.h5"),
-                models::model_file(model, out.config_yaml(), time_steps(data)), true);
+    write_model(out.file("model.h5"), model_file(model, out.config_yaml(), time_steps(data)), true);
     write_training_curves(out, result.history);
     plot_latents(out, model.codes);
     const auto weights = std::make_shared<kernels::LearnedLawWeights>(model.law->weights());

@@ -9,6 +9,7 @@
 #include "uniphy/data/random_law_samples.hpp"
 #include "uniphy/io/model_file.hpp"
 #include "uniphy/training/heldout_fit.hpp"
+#include "uniphy/training/trained_model_file.hpp"
 #include "uniphy/training/trainer.hpp"
 
 namespace uniphy {
@@ -60,8 +61,7 @@ TEST(RandomLaws, AreLearnedBesideTheFamilies) {
                     metrics);
   for (const char* name : {"random_solid", "random_fluid", "random_plastic", "sand"})
     EXPECT_LT(*metrics.find(std::string("stress_error.") + name), 1) << name;
-  write_model(scratch.file("model.h5"), models::model_file(result.model, "", time_steps(data)),
-              true);
+  write_model(scratch.file("model.h5"), model_file(result.model, "", time_steps(data)), true);
   EXPECT_EQ(read_model(scratch.file("model.h5")).materials, result.model.codes->materials());
 }
 
