@@ -63,7 +63,7 @@ void run(const uniphy::ObservationSource& observed, const uniphy::FitVariablesSo
   std::fputs(rung_table(result.rung, result.rungs).c_str(), stdout);
   std::fputs(fit_summary(result.fit, *variables).c_str(), stdout);
   if (result.fit.determined) {
-    std::fputs(reading_text(result.reading).c_str(), stdout);
+    std::fputs(belief_text(result.material).c_str(), stdout);
   } else {
     out.set_no_answer();
   }

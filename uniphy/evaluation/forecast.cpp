@@ -51,7 +51,7 @@ Forecast forecast(const JudgedMotion& motion, const FitVariables& variables,
   f.rung = static_cast<int>(result.rung);
   f.explained = result.explained;
   if (result.fit.determined) f.nearest = variables.nearest(result.fit.u, 1).front().code;
-  f.material = result.reading.material;
+  f.material = result.material.reading.material;
   f.roll_outs = static_cast<double>(result.fit.history.size());
   if (!result.rungs.empty()) f.roll_outs = 0;
   for (const RungReport& r : result.rungs) f.roll_outs += r.roll_outs;

@@ -134,12 +134,22 @@ class Ladder {
     for (int round = 0; round < rounds; ++round) {
       const std::string name = round == 0 ? "code" : fmt::format("code, round {}", round + 1);
       c.point =
-          fitter_.least_squares(part_, part_.frames, Rung::latent, c.point, {c.point, least_pull()},
+          fitter_.least_squares(part_, part_.frames, Rung::latent, c.point, c.point, least_pull(),
                                 name, round == 0 ? adaptation_.iterations : kRoundIterations, true);
       if (fits_starts_) move_starts(Rung::latent, c.point, part_);
     }
     conclude(c, Rung::latent);
     return c;
+  }
+
+  void add_posterior(Rung rung, const Tensor& point) {
+    if (adaptation_.samples == 0) return;
+    result_.posterior = fitter_.posterior(observation_, rung, point);
+    const FitVariables& variables =
+        rung == Rung::latent ? latent_ : static_cast<const FitVariables&>(fitter_.variables(rung));
+    for (const Tensor& sample : result_.posterior.samples) {
+      result_.samples.push_back(variables.law(sample.slice(0, 0, variables.size()).contiguous()));
+    }
   }
 
   /// Moves the starts of the points to where a law and the frames of `seen` have them.
@@ -155,6 +165,7 @@ class Ladder {
     fit.u.assign(c.point.data_ptr<double>(), c.point.data_ptr<double>() + c.point.numel());
     fit.motion = fitter_.motion();
     fit.mse = c.fitted * c.fitted * fitter_.size() * fitter_.size();
+    add_posterior(Rung::latent, c.point);
     return result_;
   }
 
@@ -216,7 +227,7 @@ class Ladder {
       if (s > 0) pull *= kPullOfHorizons;
       for (Climber& c : climbers) {
         c.point = fitter_.least_squares(
-            part_, horizons[s], Rung::numbers, c.point, {c.start, std::max(pull, least_pull())},
+            part_, horizons[s], Rung::numbers, c.point, c.start, std::max(pull, least_pull()),
             fmt::format("{} {}", c.name, s + 1), kTrialIterations, false);
         c.kept = root_mean_square(fitter_.roots(c.point, Rung::numbers, horizons[s + 1]),
                                   horizons[s], horizons[s + 1]);
@@ -228,9 +239,9 @@ class Ladder {
     Climber best = climbers.front();
     for (int k = 1; pull > least_pull(); ++k) {
       pull = std::max(kPullOfFits * pull, least_pull());
-      best.point = fitter_.least_squares(
-          part_, part_.frames, Rung::numbers, best.point, {best.start, pull},
-          fmt::format("{} last {}", best.name, k), adaptation_.iterations, false);
+      best.point = fitter_.least_squares(part_, part_.frames, Rung::numbers, best.point, best.start,
+                                         pull, fmt::format("{} last {}", best.name, k),
+                                         adaptation_.iterations, false);
     }
     conclude(best, Rung::numbers);
     return best;
@@ -252,12 +263,11 @@ class Ladder {
     const Rung rung = result_.rung;
     const RigidMotion before = fitter_.motion();
     Climber last = best;
-    last.point =
-        rung == Rung::weights
-            ? fitter_.descend(observation_, best.point, task,
-                              std::max(1, adaptation_.epochs / kLastShare))
-            : fitter_.least_squares(observation_, observation_.frames, rung, best.point,
-                                    {best.point, least_pull()}, task, kLastIterations, true);
+    last.point = rung == Rung::weights
+                     ? fitter_.descend(observation_, best.point, task,
+                                       std::max(1, adaptation_.epochs / kLastShare))
+                     : fitter_.least_squares(observation_, observation_.frames, rung, best.point,
+                                             best.point, least_pull(), task, kLastIterations, true);
     if (rung != Rung::latent && !fitter_.lasts(last.point, rung)) {
       last.point = best.point;
       fitter_.set_motion(before);
@@ -274,6 +284,7 @@ class Ladder {
     const double root = root_mean_square(fitter_.roots(last.point, rung, observation_.frames), 0,
                                          observation_.frames);
     fit.mse = root * root * fitter_.size() * fitter_.size();
+    add_posterior(rung, last.point);
     result_.rungs = fitter_.reports();
   }
 

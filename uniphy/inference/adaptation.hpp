@@ -5,6 +5,7 @@
 
 #include "uniphy/inference/adapted_variables.hpp"
 #include "uniphy/inference/fit.hpp"
+#include "uniphy/inference/fit_posterior.hpp"
 #include "uniphy/inference/rung_report.hpp"
 
 namespace uniphy {
@@ -24,6 +25,7 @@ struct AdaptationOptions {
   int epochs = 60;                  ///< roll-outs with gradients of all weights
   std::string optimizer = "lbfgs";  ///< of all weights, see DescentOptions
   double rate = 0.01;               ///< likewise
+  int samples = 64;                 ///< of the posterior (FitPosterior), a multiple of 8; 0: none
 };
 
 struct Adaptation {
@@ -34,6 +36,10 @@ struct Adaptation {
   /// StartCorrection.
   Observation seen;
   bool starts_fitted = false;
+  /// Of the rung chosen; of all weights only z and the law's own numbers count as unknown. Empty
+  /// without a contact, and where no samples are asked for.
+  FitPosterior posterior;
+  std::vector<kernels::LawDescription> samples;  ///< the laws of posterior.samples
 };
 
 /// Finds the law of an observation with as much freedom as its motion asks for: z; then also the
@@ -52,6 +58,7 @@ struct Adaptation {
 ///    that grow as in the schedule, and half of them, those that forecast best up to the next one,
 ///    go on. All are pulled to where they began, less and less, until no more than the noise says.
 /// 4. The rung chosen is fitted to the whole observation, from where it is.
+/// 5. What the observation says about the numbers of that rung: fit_posterior.
 ///
 /// With z the initial velocity is fitted by LevenbergMarquardt. Where the points are tracers or
 /// noisy, where they start is, too (StartCorrection): eliminated within a fit and moved after it,

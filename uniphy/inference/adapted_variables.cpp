@@ -13,6 +13,12 @@ Tensor last_biases(const ops::FlatLayers& layers, std::int64_t begin) {
   return torch::arange(end - layers.widths.back(), end);
 }
 
+/// The biases of the last layers among the numbers of both networks.
+Tensor own_numbers(const ops::LearnedNetworks& networks) {
+  const std::int64_t first = networks.projection.numbers.numel();
+  return torch::cat({last_biases(networks.projection, 0), last_biases(networks.stress, first)});
+}
+
 }  // namespace
 
 const char* rung_name(Rung rung) { return kRungNames[static_cast<int>(rung)]; }
@@ -27,8 +33,7 @@ AdaptedVariables::AdaptedVariables(const FitVariables& latent, Rung rung)
       networks_(latent.body(torch::tensor(latent.start(0), torch::kFloat64), 0).networks) {
   const std::int64_t first = networks_.projection.numbers.numel();
   const std::int64_t count = first + networks_.stress.numbers.numel();
-  const Tensor biases =
-      torch::cat({last_biases(networks_.projection, 0), last_biases(networks_.stress, first)});
+  const Tensor biases = own_numbers(networks_);
   const Tensor none = torch::empty({0}, torch::kInt64);
   Tensor others = torch::ones({count}, torch::kBool);
   others.index_fill_(0, biases, false);
@@ -72,6 +77,16 @@ std::vector<double> AdaptedVariables::start(int i) const {
 Tensor AdaptedVariables::widened(const AdaptedVariables& from, const Tensor& u) const {
   const Tensor change = from.added(u.detach());
   return torch::cat({from.code(u.detach()), change.index_select(0, free_)});
+}
+
+std::vector<std::int64_t> AdaptedVariables::leading() const {
+  std::vector<std::int64_t> columns;
+  for (std::int64_t k = 0; k < latent_.size(); ++k) columns.push_back(k);
+  const Tensor biases = own_numbers(networks_);
+  for (std::int64_t k = 0; k < free_.numel(); ++k) {
+    if (biases.eq(free_[k]).any().item<bool>()) columns.push_back(latent_.size() + k);
+  }
+  return columns;
 }
 
 Tensor AdaptedVariables::outputs(const Tensor& u) const {

@@ -2,8 +2,10 @@
 
 #include <torch/types.h>
 
+#include <cstdint>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "uniphy/inference/fit_variables.hpp"
 
@@ -44,6 +46,8 @@ class AdaptedVariables : public FitVariables {
   /// What the projection's and then the stress's network answer with where every feature of the
   /// state is 0, [outputs] float64; the biases of `numbers` stand in the same order.
   torch::Tensor outputs(const torch::Tensor& u) const;
+  /// Which of u are z and those of the law's own numbers that are free here.
+  std::vector<std::int64_t> leading() const;
   /// Coordinates of z in u.
   torch::Tensor code(const torch::Tensor& u) const { return u.slice(0, 0, latent_.size()); }
 

@@ -66,7 +66,9 @@ struct FitResult {
   std::vector<double> start_mse;  ///< [starts] over all frames, infinite where the roll-out failed
   std::vector<FitRecord> history;
   std::ptrdiff_t contact = 0;  ///< first frame at which a wall acts, see first_contact
-  bool determined = true;      ///< false: no wall acted, and any law would have fitted
+  /// False where no wall acted, so that any law would have fitted, or where what was seen after it
+  /// tells none of the numbers (FitPosterior::determined).
+  bool determined = true;
 };
 
 struct FitHooks {

@@ -26,7 +26,7 @@ std::vector<FittedParameter> fitted_parameters(const kernels::LawDescription& la
 }
 
 std::string fit_summary(const FitResult& fit, const FitVariables& variables) {
-  if (!fit.determined) return "material not determined: no wall acted before the last frame\n";
+  if (!fit.determined) return "material not determined\n";
   std::string text;
   for (const FittedParameter& p : fitted_parameters(fit.law, variables)) {
     const auto& [low, high] = p.range;
@@ -52,10 +52,18 @@ std::vector<std::string> fit_warnings(const Inference& inference, const Observat
   };
   const FitResult& fit = inference.fit;
   const ObservationCheck& check = inference.check;
-  if (!fit.determined) {
+  if (fit.contact >= observation.frames) {
     warn(
         "no wall acted before the last frame, and free flight looks alike for every material: "
         "it is not determined; expected an observation that goes on beyond a contact");
+  }
+  if (!fit.determined && fit.contact < observation.frames) {
+    warn(fmt::format(
+        "the motion after the first contact, at {:.3g} s of {:.3g} s, determines none of the {} "
+        "numbers of the fit to half of what is known beforehand; expected an observation that goes "
+        "on for longer, or that has less noise",
+        observation.time[fit.contact] - observation.time[0],
+        observation.time.back() - observation.time[0], inference.posterior.spread.size()));
   }
   warn(start_warning(check));
   const double volume = std::accumulate(observation.volume.begin(), observation.volume.end(), 0.0);

@@ -26,7 +26,7 @@ std::vector<FittedParameter> fitted_parameters(const kernels::LawDescription& la
 std::string fit_summary(const FitResult& fit, const FitVariables& variables);
 
 /// What is doubtful about a finished fit, a sentence each:
-///   - no wall acted before the last frame;
+///   - no wall acted before the last frame, or nothing is determined by what was seen after it;
 ///   - the first frame is not an undeformed body in rigid motion (start_warning);
 ///   - less than one particle a cell (sparse_warning);
 ///   - a misfit of more than kLargeMisfit and the noise;

@@ -25,10 +25,6 @@ constexpr double kNoisyStarts = 1e-3;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// Units in which the initial velocity is refined, beside u which is of order one.
-constexpr double kLinearUnit = 0.1;   // m/s
-constexpr double kAngularUnit = 0.5;  // rad/s
-
 }  // namespace
 
 FitProblem::FitProblem(const Observation& observation, const std::string& name,
@@ -129,6 +125,15 @@ RigidMotion FitProblem::motion_at(const Tensor& point) const {
   at.motion = point.numel() > variables_.size() ? point.slice(0, variables_.size()).contiguous()
                                                 : torch::zeros({kMotion}, torch::kFloat64);
   return motion(at);
+}
+
+Tensor FitProblem::change_to(const RigidMotion& to) const {
+  Tensor change = torch::empty({kMotion}, torch::kFloat64);
+  for (int k = 0; k < 3; ++k) {
+    change[k] = (to.linear[k] - motion_.linear[k]) / kLinearUnit;
+    change[3 + k] = (to.angular[k] - motion_.angular[k]) / kAngularUnit;
+  }
+  return change;
 }
 
 StartCorrection FitProblem::start_correction(const Tensor& point, std::ptrdiff_t frames) const {

@@ -27,6 +27,7 @@ class FitProblem {
   std::ptrdiff_t frames() const { return observation_.frames; }
   /// Whether the points are tracers or so noisy that where they start has to be fitted, too.
   bool fits_starts() const { return fits_starts_; }
+  double noise_over_size() const { return noise_ / size_; }
   /// How strongly least squares over the first `frames` are pulled to where they begin at least.
   double least_pull(std::ptrdiff_t frames) const;
   /// Coordinates that the first `frames` show, about.
@@ -48,7 +49,7 @@ class FitProblem {
   double mse_of(double loss, const torch::Tensor& u) const;
 
   /// Leaves to be moved in a stage, copies of the candidate's: u [size], and where it moves the
-  /// initial velocity the change of it [kMotion], in units of 0.1 m/s and 0.5 rad/s.
+  /// initial velocity the change of it [kMotion], in units of kLinearUnit and kAngularUnit.
   std::vector<torch::Tensor> leaves(const FitCandidate& c, int stage) const;
   /// Whether a stage moves the initial velocity: the last one does. Gradients do so only where
   /// there is noise: else the first frames tell it better than a law that is still far off, and a
@@ -63,8 +64,10 @@ class FitProblem {
   /// undefined where the loss is not finite.
   Evaluation evaluate(const std::vector<torch::Tensor>& leaves, int stage) const;
 
-  /// Numbers of the change of the initial velocity, in the units of leaves().
+  /// Numbers of the change of the initial velocity, and their units, those of leaves().
   static constexpr int kMotion = 6;
+  static constexpr double kLinearUnit = 0.1;   // m/s
+  static constexpr double kAngularUnit = 0.5;  // rad/s
   /// What least squares minimise over the first `frames` at a point: u, or u and the change of the
   /// initial velocity [size + kMotion]. (x̂ − x)/size, or what `starts`, of as many frames, leaves
   /// of it, and the root of the prior, scaled so that the sum of the squares is loss(). Undefined
@@ -74,6 +77,8 @@ class FitProblem {
                           const StartCorrection* starts = nullptr) const;
   /// x̂ − x [frames, 3 points], m, at such a point. Throws Error where the roll-out fails.
   torch::Tensor misses(const torch::Tensor& point, std::ptrdiff_t frames) const;
+  /// The change of the initial velocity that makes it `to`, [kMotion] in the units of leaves().
+  torch::Tensor change_to(const RigidMotion& to) const;
   /// The initial velocity at such a point.
   RigidMotion motion_at(const torch::Tensor& point) const;
   /// Of the starts, by the flow at such a point.

@@ -29,6 +29,7 @@ class LatentFitVariables : public FitVariables {
     if (file.codes() == 0) throw Error("model: expected latent codes to start from, found none");
     law_ = models::LearnedLaw(file.weights, torch::kFloat64)->frozen();
     materials_ = file.materials;
+    parameters_ = file.parameters;
     const auto codes = static_cast<int>(materials_.size());
     const torch::Tensor z = to_tensor(file.latents).view({codes, file.weights.latent_size});
     mean_ = z.mean(0);
@@ -56,12 +57,23 @@ class LatentFitVariables : public FitVariables {
   std::vector<double> start(int i) const override { return starts_[i]; }
   std::string label(int i) const override { return materials_[i]; }
   std::array<double, 2> training_dt() const override { return training_dt_; }
+  std::optional<kernels::LawDescription> origin(int i) const override {
+    if (is_random_law(materials_[i]) || std::isnan(parameters_[i][0])) return {};
+    kernels::LawDescription law;
+    law.id = kernels::law_id(materials_[i]);
+    for (const kernels::LawParameter& p : kernels::law_parameters(law.id)) {
+      law.*p.member = parameters_[i][static_cast<std::size_t>(p.place)];
+      if (std::isnan(law.*p.member)) return {};
+    }
+    return law;
+  }
 
  private:
   torch::Tensor code(const torch::Tensor& u) const { return mean_ + spread_ * u; }
 
   models::LearnedLaw law_{nullptr};  // frozen
   std::vector<std::string> materials_;
+  std::vector<MaterialParameters> parameters_;
   std::array<double, 2> training_dt_;  // s
   torch::Tensor mean_, spread_;        // [latent size]
   std::vector<std::vector<double>> starts_;

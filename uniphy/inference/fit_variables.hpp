@@ -4,6 +4,7 @@
 
 #include <array>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -33,6 +34,9 @@ class FitVariables {
   virtual int starts() const = 0;
   virtual std::vector<double> start(int i) const = 0;
   virtual std::string label(int i) const = 0;
+
+  /// The analytic law that start i was trained to be, where one is known.
+  virtual std::optional<kernels::LawDescription> origin(int) const { return {}; }
 
   /// [low, high] of each parameter of an analytic law, in the order of law_parameters(id), which
   /// starts are drawn from; empty for a learned one.

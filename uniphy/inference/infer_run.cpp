@@ -8,9 +8,11 @@
 #include <map>
 #include <numeric>
 
+#include "ops/kernels/base/for_each.hpp"
 #include "ops/kernels/base/hash.hpp"
 #include "uniphy/inference/fit_findings.hpp"
 #include "uniphy/inference/observed_motion.hpp"
+#include "uniphy/inference/reading_error.hpp"
 #include "uniphy/inference/start_correction.hpp"
 
 namespace uniphy {
@@ -24,6 +26,36 @@ void add_weights(kernels::Hash& hash, const kernels::LawDescription& law) {
       hash.add(layer.bias);
     }
   }
+}
+
+void add_material(Metrics& metrics, const MaterialBelief& belief) {
+  metrics.set("material." + belief.reading.material, 1);
+  for (const auto& [material, probability] : belief.probability) {
+    metrics.set("probability." + material, probability);
+  }
+  for (const ReadingNumber& n : reading_numbers()) {
+    const std::pair<const char*, double> numbers[] = {{"", belief.reading.*n.value},
+                                                      {".low", belief.low.*n.value},
+                                                      {".high", belief.high.*n.value}};
+    for (const auto& [end, value] : numbers) {
+      if (!std::isnan(value)) metrics.set(fmt::format("reading.{}{}", n.key, end), value);
+    }
+  }
+}
+
+/// Of the law found and of those drawn from the posterior, by what the roll-out strained it.
+MaterialBelief read_inference(const Inference& inference, const Adaptation& adapted,
+                              const FitVariables& variables, const MotionObjective& objective) {
+  const FitResult& fit = inference.fit;
+  const double dt = inference.seen.dt;
+  const double strain =
+      strain_seen(objective.deformations(fit.law, fit.motion, inference.seen.frames));
+  std::vector<MaterialReading> samples(adapted.samples.size());
+  kernels::for_each(static_cast<std::ptrdiff_t>(samples.size()), [&](std::ptrdiff_t i) {
+    samples[i] = read_material(adapted.samples[i], dt, strain);
+  });
+  const MaterialBelief belief = material_belief(read_material(fit.law, dt, strain), samples);
+  return with_reading_error(belief, reading_error(variables, belief.reading.material, dt, strain));
 }
 
 }  // namespace
@@ -75,10 +107,11 @@ Inference infer(const Observation& observation, const std::string& name,
   result.fit_mse = std::pow(result.misfit.over_size * result.size, 2);
   result.best_start = *std::min_element(result.fit.start_mse.begin(), result.fit.start_mse.end());
   result.explained = explains(result);
+  result.posterior = adapted.posterior;
+  const FitPosterior& posterior = result.posterior;
+  if (!posterior.spread.empty() && posterior.determined == 0) result.fit.determined = false;
   if (result.fit.determined) {
-    result.reading = read_material(
-        result.fit.law, seen.dt,
-        strain_seen(objective->deformations(result.fit.law, result.fit.motion, seen.frames)));
+    result.material = read_inference(result, adapted, variables, *objective);
   }
   return result;
 }
@@ -162,8 +195,9 @@ void add_metrics(Metrics& metrics, const Inference& inference, const Observation
   metrics.set("start_allowed_over_size", check.start_allowed / check.size);
   metrics.set("energy_gain_over_kinetic",
               check.kinetic > 0 ? check.energy_gain / check.kinetic : 0);
-  metrics.set("contact", fit.determined ? 1 : 0);
-  if (fit.determined) {
+  const bool contact = fit.contact < observation.frames;
+  metrics.set("contact", contact ? 1 : 0);
+  if (contact) {
     metrics.set("contact_s", observation.time[fit.contact] - observation.time[0]);
   }
   metrics.set("determined", fit.determined ? 1 : 0);
@@ -182,17 +216,11 @@ void add_metrics(Metrics& metrics, const Inference& inference, const Observation
     metrics.set(fmt::format("angular_velocity.{}", axes[k]), fit.motion.angular[k]);
   }
   if (!fit.determined) return;
-  const MaterialReading& m = inference.reading;
-  metrics.set("material." + m.material, 1);
-  const std::pair<const char*, double> readings[] = {{"mu", m.mu},
-                                                     {"lambda", m.lambda},
-                                                     {"young", m.young},
-                                                     {"poisson", m.poisson},
-                                                     {"yield_stress", m.yield_stress},
-                                                     {"friction_angle", m.friction_angle},
-                                                     {"viscosity", m.viscosity}};
-  for (const auto& [name, value] : readings) {
-    if (!std::isnan(value)) metrics.set(std::string("reading.") + name, value);
+  add_material(metrics, inference.material);
+  if (!inference.posterior.spread.empty()) {
+    metrics.set("directions", static_cast<double>(inference.posterior.spread.size()));
+    metrics.set("directions_determined", inference.posterior.determined);
+    metrics.set("dispersion", inference.posterior.dispersion);
   }
   metrics.set("nearest.distance", variables.nearest(fit.u, 1).front().distance);
   for (const FittedParameter& p : fitted_parameters(fit.law, variables)) {

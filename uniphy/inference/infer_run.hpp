@@ -7,7 +7,7 @@
 
 #include "uniphy/inference/adaptation.hpp"
 #include "uniphy/inference/infer_options.hpp"
-#include "uniphy/inference/material_reading.hpp"
+#include "uniphy/inference/material_belief.hpp"
 #include "uniphy/inference/misfit.hpp"
 #include "uniphy/inference/observation_check.hpp"
 #include "uniphy/io/trajectory.hpp"
@@ -28,7 +28,8 @@ struct Inference {
   Rung rung = Rung::latent;       ///< how far the law was adapted
   std::vector<RungReport> rungs;  ///< see Adaptation
   Misfit misfit;                  ///< of `fitted`
-  MaterialReading reading;        ///< of the fitted law; empty where it is not determined
+  MaterialBelief material;        ///< of the fitted law; empty where it is not determined
+  FitPosterior posterior;         ///< see Adaptation
   bool explained = true;  ///< whether noise and tolerance account for the misfit, see explains()
 };
 
@@ -64,8 +65,10 @@ std::optional<std::size_t> roll_outs_to_a_hundredth(const FitResult& fit);
 /// velocity.{x,y,z}, angular_velocity.{x,y,z}, determined (1 or 0); where the material is
 /// determined, explained (1 or 0), rung (0 latent, 1 numbers, 2 weights) and, where frames were
 /// kept, of every rung that was tried fitted_over_size.RUNG, kept_over_size.RUNG, roll_outs.RUNG,
-/// seconds.RUNG; material.NAME (1 of what the law behaves like), reading.{mu, lambda, young,
-/// poisson, yield_stress, friction_angle, viscosity} where it has one (MaterialReading, SI units),
+/// seconds.RUNG; material.NAME (1 of what the law behaves like), probability.NAME,
+/// reading.{mu, lambda, young, poisson, yield_stress, friction_angle, cohesion, viscosity} where it
+/// has one (MaterialReading, SI units) with the ends of its 90 % interval, reading.NAME.low and
+/// .high; directions (numbers of the fit), directions_determined, dispersion (FitPosterior);
 /// nearest.distance and, of an analytic law, parameter.NAME and outside_range.NAME (1 where it
 /// ended outside of its range).
 void add_metrics(Metrics& metrics, const Inference& inference, const Observation& observation,

@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <sstream>
 
 #include "ops/kernels/base/error.hpp"
@@ -23,6 +24,10 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr std::array<double, LevenbergMarquardt::kTrials> kMultiples{1e-2, 1e-1, 1, 10};
 /// Share of the gain that the linear model predicts from which a step is as good as it says.
 constexpr double kGoodGain = 0.25;
+/// Share of a step at which the residuals show its curvature, and the longest acceleration over the
+/// step that is taken: beyond it the quadratic model says no more than the linear one (M. Transtrum
+/// and J. Sethna, arXiv:1201.5885: 0.1 and, of twice the acceleration, 0.75).
+constexpr double kProbe = 0.1, kMostBend = 0.375;
 /// How often the damping grows by kGrowth before a step is given up.
 constexpr int kRounds = 3;
 constexpr double kGrowth = 1e4;
@@ -35,12 +40,6 @@ constexpr double kFloor = 1e-6;
 using ConstVector = Eigen::Map<const Eigen::VectorXd>;
 
 ConstVector vector_of(const Tensor& t) { return {t.data_ptr<double>(), t.numel()}; }
-
-double loss_of(const Tensor& residuals) {
-  if (!residuals.defined()) return kInfinity;
-  const double loss = vector_of(residuals).squaredNorm();
-  return std::isfinite(loss) ? loss : kInfinity;
-}
 
 Tensor moved(const Tensor& point, const Eigen::VectorXd& step) {
   Tensor result = point.clone();
@@ -90,11 +89,17 @@ Tensor LevenbergMarquardt::step(const Residuals& residuals) {
   if (!residuals_.defined()) {
     residuals_ = residuals(point());
     if (!std::isfinite(loss_)) ++evaluations_;  // else it is known from before an interruption
-    loss_ = loss_of(residuals_);
+    loss_ = sum_of_squares(residuals_);
   }
   stuck_ = true;
   if (std::isfinite(loss_) && loss_ > 0) {
-    const Eigen::MatrixXd J = jacobian(residuals);
+    const Tensor here = point();
+    std::vector<std::int64_t> columns(static_cast<std::size_t>(here.numel()));
+    std::iota(columns.begin(), columns.end(), std::int64_t{0});
+    const DifferenceJacobian slopes =
+        difference_jacobian(residuals, here, residuals_, columns, options().difference());
+    evaluations_ += slopes.evaluations;
+    const Eigen::MatrixXd& J = slopes.J;
     const Eigen::Index n = J.cols();
     Eigen::MatrixXd A(n, n);
     Eigen::VectorXd g(n);
@@ -102,7 +107,7 @@ Tensor LevenbergMarquardt::step(const Residuals& residuals) {
       for (Eigen::Index j = 0; j <= i; ++j) A(i, j) = A(j, i) = J.col(i).dot(J.col(j));
       g[i] = J.col(i).dot(vector_of(residuals_));
     });
-    const Trial best = best_trial(residuals, A, g);
+    const Trial best = best_trial(residuals, J, A, g);
     if (best.loss < loss_) {
       move_to(best.point);
       residuals_ = best.residuals;
@@ -114,27 +119,8 @@ Tensor LevenbergMarquardt::step(const Residuals& residuals) {
   return torch::scalar_tensor(loss_, torch::kFloat64);
 }
 
-/// Where a point a step further on has no residuals, the one a step back is taken.
-Eigen::MatrixXd LevenbergMarquardt::jacobian(const Residuals& residuals) {
-  const Tensor here = point();
-  const Eigen::Index n = here.numel();
-  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(residuals_.numel(), n);
-  std::vector<int> calls(n, 0);
-  kernels::for_each(n, [&](std::ptrdiff_t k) {
-    const torch::NoGradGuard no_grad;
-    for (const double h : {options().difference(), -options().difference()}) {
-      const Tensor there = residuals(moved(here, h * Eigen::VectorXd::Unit(n, k)));
-      ++calls[k];
-      if (!std::isfinite(loss_of(there))) continue;
-      J.col(k) = (vector_of(there) - vector_of(residuals_)) / h;
-      return;
-    }
-  });
-  for (const int count : calls) evaluations_ += count;
-  return J;
-}
-
 LevenbergMarquardt::Trial LevenbergMarquardt::best_trial(const Residuals& residuals,
+                                                         const Eigen::MatrixXd& J,
                                                          const Eigen::MatrixXd& A,
                                                          const Eigen::VectorXd& g) {
   const Tensor here = point();
@@ -147,19 +133,33 @@ LevenbergMarquardt::Trial LevenbergMarquardt::best_trial(const Residuals& residu
     kernels::for_each(static_cast<std::ptrdiff_t>(trials.size()), [&](std::ptrdiff_t i) {
       const torch::NoGradGuard no_grad;
       Trial& trial = trials[i];
+      trial.loss = kInfinity;
       trial.damping = kMultiples[i] * damping_;
       Eigen::MatrixXd damped = A;
       damped.diagonal() += trial.damping * A.diagonal().cwiseMax(kFloor * largest);
-      Eigen::VectorXd step = damped.ldlt().solve(-g);
-      for (Eigen::Index k = 0; k < step.size(); ++k) {
-        if (A(k, k) == 0) step[k] = 0;
+      const Eigen::LDLT<Eigen::MatrixXd> solver(damped);
+      const auto solved = [&](const Eigen::VectorXd& right) {
+        Eigen::VectorXd step = solver.solve(right);
+        for (Eigen::Index k = 0; k < step.size(); ++k) {
+          if (A(k, k) == 0) step[k] = 0;
+        }
+        return step;
+      };
+      Eigen::VectorXd step = solved(-g);
+      trial.predicted = -(2 * g.dot(step) + step.dot(A * step));
+      if (!step.allFinite()) return;
+      const Tensor ahead = residuals(moved(here, kProbe * step));
+      if (std::isfinite(sum_of_squares(ahead))) {
+        const Eigen::VectorXd curvature =
+            2 / kProbe * ((vector_of(ahead) - vector_of(residuals_)) / kProbe - J * step);
+        const Eigen::VectorXd bend = solved(-0.5 * (J.transpose() * curvature));
+        if (bend.norm() <= kMostBend * step.norm()) step += bend;
       }
       trial.point = moved(here, step);
-      trial.predicted = -(2 * g.dot(step) + step.dot(A * step));
-      if (step.allFinite()) trial.residuals = residuals(trial.point);
-      trial.loss = loss_of(trial.residuals);
+      trial.residuals = residuals(trial.point);
+      trial.loss = sum_of_squares(trial.residuals);
     });
-    evaluations_ += static_cast<int>(trials.size());
+    evaluations_ += 2 * static_cast<int>(trials.size());
     for (const Trial& trial : trials) {
       if (trial.loss < best.loss) best = trial;
     }

@@ -4,9 +4,10 @@
 #include <torch/types.h>
 
 #include <Eigen/Core>
-#include <functional>
 #include <string>
 #include <vector>
+
+#include "uniphy/inference/difference_jacobian.hpp"
 
 namespace uniphy {
 
@@ -34,17 +35,14 @@ struct LevenbergMarquardtOptions
 /// threads.
 class LevenbergMarquardt : public torch::optim::Optimizer {
  public:
-  /// The residuals [M], float64, at a point [N]: all leaves one after the other. Undefined where
-  /// there are none (the roll-out failed). Is called by several threads at the same time.
-  using Residuals = std::function<torch::Tensor(const torch::Tensor& point)>;
-
   /// Dampings that are tried at once.
   static constexpr int kTrials = 4;
 
   /// The leaves, float64, are moved in place.
   LevenbergMarquardt(std::vector<torch::Tensor> leaves, const LevenbergMarquardtOptions& options);
 
-  /// One iteration; ‖r‖² [] at the new leaves, infinite where there is none at the first ones.
+  /// One iteration on the residuals at a point, all leaves one after the other; ‖r‖² [] at the new
+  /// leaves, infinite where there is none at the first ones.
   torch::Tensor step(const Residuals& residuals);
   /// Throws Error: a loss that is one number does not do.
   torch::Tensor step(LossClosure closure) override;
@@ -72,8 +70,8 @@ class LevenbergMarquardt : public torch::optim::Optimizer {
 
   const LevenbergMarquardtOptions& options() const;
   void move_to(const torch::Tensor& point);
-  Eigen::MatrixXd jacobian(const Residuals& residuals);
-  Trial best_trial(const Residuals& residuals, const Eigen::MatrixXd& A, const Eigen::VectorXd& g);
+  Trial best_trial(const Residuals& residuals, const Eigen::MatrixXd& J, const Eigen::MatrixXd& A,
+                   const Eigen::VectorXd& g);
 
   torch::Tensor residuals_;  ///< [M] at the leaves; undefined: not known
   double loss_, damping_;

@@ -1,7 +1,5 @@
 #include "uniphy/inference/material_reading.hpp"
 
-#include <fmt/format.h>
-
 #include <Eigen/Core>
 #include <Eigen/SVD>
 #include <algorithm>
@@ -107,6 +105,11 @@ void read_yield(const Probe& probe, double dt, MaterialReading& m) {
         (pressed - free) / (kPressed - kUnpressed) * 2 * m.mu / (3 * m.lambda + 2 * m.mu);
     const double s = alpha * std::sqrt(1.5);
     m.friction_angle = std::asin(std::clamp(3 * s / (2 + s), 0.0, 1.0));
+    // The cone meets the deviator at ‖s₀‖ = 2√6 c cos θ/(3 − sin θ) where there is no pressure.
+    const double slope = (pressed - free) / (kPressed - kUnpressed);
+    const double s0 = 2 * m.mu * std::max(0.0, free - slope * kUnpressed);
+    m.cohesion =
+        s0 * (3 - std::sin(m.friction_angle)) / (2 * std::sqrt(6.0) * std::cos(m.friction_angle));
     return;
   }
   const Probe::Answer at = probe.at(Probe::shear(free, 0));
@@ -159,24 +162,18 @@ double strain_seen(const std::vector<double>& F) {
   return *at;
 }
 
-std::string reading_text(const MaterialReading& m) {
-  std::string text = fmt::format("behaves like: {}", m.material);
-  if (m.material == "elastic") {
-    text += fmt::format(", up to a shear of {:.2g} (norm of log strain), as far as it was seen",
-                        m.strain_seen);
-  }
-  text += "\n";
-  const auto line = [&](const char* name, double value, const char* unit) {
-    if (!std::isnan(value)) text += fmt::format("  {} {:.3g}{}\n", name, value, unit);
-  };
-  line("shear modulus mu", m.mu, " Pa");
-  line(m.material == "newtonian" ? "bulk modulus" : "lambda", m.lambda, " Pa");
-  line("Young's modulus E", m.young, " Pa");
-  line("Poisson's ratio nu", m.poisson, "");
-  line("yield stress", m.yield_stress, " Pa");
-  line("friction angle", m.friction_angle, " rad");
-  line("viscosity", m.viscosity, " Pa s");
-  return text;
+const std::vector<ReadingNumber>& reading_numbers() {
+  using M = MaterialReading;
+  static const std::vector<ReadingNumber> numbers{
+      {"mu", "shear modulus mu", "Pa", &M::mu},
+      {"lambda", "lambda", "Pa", &M::lambda},
+      {"young", "Young's modulus E", "Pa", &M::young},
+      {"poisson", "Poisson's ratio nu", "", &M::poisson},
+      {"yield_stress", "yield stress", "Pa", &M::yield_stress},
+      {"friction_angle", "friction angle", "rad", &M::friction_angle},
+      {"cohesion", "cohesion", "Pa", &M::cohesion},
+      {"viscosity", "viscosity", "Pa s", &M::viscosity}};
+  return numbers;
 }
 
 }  // namespace uniphy

@@ -22,6 +22,7 @@ struct MaterialReading {
   double young = kNone, poisson = kNone;
   double yield_stress = kNone;    ///< Pa, the norm of the deviator of τ without pressure
   double friction_angle = kNone;  ///< rad, of a cone of Drucker and Prager that touches it
+  double cohesion = kNone;        ///< Pa, of the same cone: what sand bears without pressure
   double viscosity = kNone;  ///< Pa s, of a fluid dτ/dγ̇ in shear; of a non-Newtonian body η
   double strain_seen = 0;    ///< largest norm of the deviator of log Σ that counted
 };
@@ -34,7 +35,11 @@ MaterialReading read_material(const kernels::LawDescription& law, double dt, dou
 /// F [count, 9] stay below.
 double strain_seen(const std::vector<double>& F);
 
-/// One line a number, with units; "n/a" is left out.
-std::string reading_text(const MaterialReading& reading);
+/// A number of a reading: its key in metrics, its name for people and its unit.
+struct ReadingNumber {
+  const char *key, *name, *unit;
+  double MaterialReading::*value;
+};
+const std::vector<ReadingNumber>& reading_numbers();
 
 }  // namespace uniphy

@@ -12,6 +12,7 @@
 #include "ops/kernels/base/error.hpp"
 #include "ops/kernels/laws/tracer.hpp"
 #include "ops/kernels/rollout/rollout.hpp"
+#include "uniphy/inference/misfit.hpp"
 #include "uniphy/inference/observed_frames.hpp"
 #include "uniphy/inference/observed_noise.hpp"
 #include "uniphy/scene/memory_check.hpp"
@@ -138,40 +139,78 @@ bool reaches_wall(const Observation& observation, const ObservedSteps& steps,
   return false;
 }
 
-/// Gauss–Newton on the positions of the points: linear and angular velocity, or the latter alone.
+/// What positions at the frames after the first one say against a flight: those of points that are
+/// seen there and whose start is known.
+bool counts(const Observation& observation, std::size_t k) {
+  return !std::isnan(observation.positions(1)[k]) &&
+         !(observation.tracked() &&
+           std::isnan(observation.tracers[k % observation.tracers.size()]));
+}
+
+/// The normal equations of the six numbers of a motion, or of the angular three, on the positions
+/// of the points.
+struct FlightEquations {
+  Eigen::MatrixXd normal;
+  Eigen::VectorXd right;
+  double square = 0;      ///< m², of what is left
+  std::size_t count = 0;  ///< of coordinates
+};
+FlightEquations equations(const Observation& observation, const Flight& flight, int first,
+                          int frames, const RigidMotion& motion) {
+  const auto numbers = static_cast<std::size_t>(3 * frames * observation.points());
+  const double* seen = observation.positions(1);
+  const std::vector<double> flown = flight.fly(motion);
+  std::vector<std::vector<double>> moved;
+  for (int k = first; k < 6; ++k) {
+    RigidMotion other = motion;  // the response is linear but for the motion of the particles
+    (k < 3 ? other.linear[k] : other.angular[k - 3]) += 1;
+    moved.push_back(flight.fly(other));
+  }
+  const auto size = static_cast<Eigen::Index>(moved.size());
+  FlightEquations e{Eigen::MatrixXd::Zero(size, size), Eigen::VectorXd::Zero(size)};
+  Eigen::VectorXd slope(size);
+  for (std::size_t k = 0; k < numbers; ++k) {
+    if (!counts(observation, k)) continue;
+    const double miss = seen[k] - flown[k];
+    for (Eigen::Index i = 0; i < size; ++i) slope[i] = moved[i][k] - flown[k];
+    e.normal += slope * slope.transpose();
+    e.right += slope * miss;
+    e.square += miss * miss;
+    ++e.count;
+  }
+  return e;
+}
+
+/// Gauss–Newton: linear and angular velocity, or the latter alone.
 void fit_motion(const Observation& observation, const Flight& flight, bool linear, int frames,
                 RigidMotion& motion) {
-  const double* seen = observation.positions(1);
-  const auto numbers = static_cast<std::size_t>(3 * frames * observation.points());
-  const auto counts = [&](std::size_t k) {
-    return !std::isnan(seen[k]) &&
-           !(observation.tracked() &&
-             std::isnan(observation.tracers[k % observation.tracers.size()]));
-  };
-  const int first = linear ? 0 : 3;
   for (int iteration = 0; iteration < 3; ++iteration) {
-    const std::vector<double> flown = flight.fly(motion);
-    std::vector<std::vector<double>> moved;
-    for (int k = first; k < 6; ++k) {
-      RigidMotion other = motion;  // the response is linear but for the motion of the particles
-      (k < 3 ? other.linear[k] : other.angular[k - 3]) += 1;
-      moved.push_back(flight.fly(other));
-    }
-    const auto size = static_cast<Eigen::Index>(moved.size());
-    Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(size, size);
-    Eigen::VectorXd right = Eigen::VectorXd::Zero(size), slope(size);
-    for (std::size_t k = 0; k < numbers; ++k) {
-      if (!counts(k)) continue;
-      for (Eigen::Index i = 0; i < size; ++i) slope[i] = moved[i][k] - flown[k];
-      normal += slope * slope.transpose();
-      right += slope * (seen[k] - flown[k]);
-    }
+    FlightEquations e = equations(observation, flight, linear ? 0 : 3, frames, motion);
     // A body that is a point or a line along an axis does not show its rotation about it.
-    normal.diagonal().array() += 1e-12 * normal.trace() + 1e-300;
-    const Eigen::VectorXd step = normal.ldlt().solve(right);
+    e.normal.diagonal().array() += 1e-12 * e.normal.trace() + 1e-300;
+    const Eigen::VectorXd step = e.normal.ldlt().solve(e.right);
     if (linear) motion.linear += step.head<3>();
     motion.angular += step.tail<3>();
   }
+}
+
+/// Files may hold float32: what its rounding takes from a position in the unit cube.
+constexpr double kRounding = 6e-8;
+
+std::array<double, 6> spread_of(const Observation& observation, const Flight& flight, int frames,
+                                const RigidMotion& motion) {
+  const FlightEquations e = equations(observation, flight, 0, frames, motion);
+  const auto count = static_cast<double>(std::max<std::size_t>(e.count, 1));
+  const double noise = std::max(observed_noise(observation), kRounding), square = noise * noise;
+  // Where a point starts is as noisy as where it is later, and all its frames share that error.
+  const double allowed = 2 * kNoiseAllowance * kNoiseAllowance * square;
+  const double beside = std::max(0.0, e.square / count - allowed);  // m²
+  std::array<double, 6> spread{};
+  for (int k = 0; k < 6; ++k) {
+    spread[k] =
+        std::sqrt(((1 + frames) * square + count * beside) / std::max(e.normal(k, k), 1e-300));
+  }
+  return spread;
 }
 
 }  // namespace
@@ -284,19 +323,26 @@ RigidMotion observed_motion(const Observation& observation, const ObservedSteps&
 
 RigidMotion observed_motion(const Observation& observation, const ObservedSteps& steps,
                             const kernels::GridSettings& grid) {
-  RigidMotion motion = observed_motion(observation, steps, grid, 1);
-  if (observed_noise(observation) <= kLittleNoise * observed_size(observation)) return motion;
-  // Noise may show as a fast rotation: look again with the better motion.
-  for (int frames = 1, before = 0; frames > before;) {
-    before = frames;
-    while (frames + 1 < observation.frames &&
-           steps_to(steps, frames + 1) * grid.dt * motion.angular.norm() < kFlightAngle &&
-           !reaches_wall(observation, steps, grid, motion, frames + 1)) {
-      ++frames;
+  return estimate_motion(observation, steps, grid).motion;
+}
+
+MotionEstimate estimate_motion(const Observation& observation, const ObservedSteps& steps,
+                               const kernels::GridSettings& grid) {
+  int frames = 1;
+  RigidMotion motion = observed_motion(observation, steps, grid, frames);
+  if (observed_noise(observation) > kLittleNoise * observed_size(observation)) {
+    // Noise may show as a fast rotation: look again with the better motion.
+    for (int before = 0; frames > before;) {
+      before = frames;
+      while (frames + 1 < observation.frames &&
+             steps_to(steps, frames + 1) * grid.dt * motion.angular.norm() < kFlightAngle &&
+             !reaches_wall(observation, steps, grid, motion, frames + 1)) {
+        ++frames;
+      }
+      if (frames > before) motion = observed_motion(observation, steps, grid, frames);
     }
-    if (frames > before) motion = observed_motion(observation, steps, grid, frames);
   }
-  return motion;
+  return {motion, spread_of(observation, Flight(observation, steps, grid, frames), frames, motion)};
 }
 
 std::ptrdiff_t first_contact(const Observation& observation, const ObservedSteps& steps,

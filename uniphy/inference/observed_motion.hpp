@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <array>
 #include <string>
 #include <vector>
 
@@ -61,6 +62,17 @@ RigidMotion observed_motion(const Observation& observation, const ObservedSteps&
 /// before the body reaches a wall and before it has turned by kFlightAngle.
 RigidMotion observed_motion(const Observation& observation, const ObservedSteps& steps,
                             const kernels::GridSettings& grid);
+
+/// That motion and how well it is known.
+struct MotionEstimate {
+  RigidMotion motion;
+  /// Standard deviations of the linear (m/s) and the angular (rad/s) velocity: of the noise as of
+  /// errors that the frames of a point share (its start) and that points do not, and of what free
+  /// flight leaves beside it as of one error that all points share.
+  std::array<double, 6> spread{};
+};
+MotionEstimate estimate_motion(const Observation& observation, const ObservedSteps& steps,
+                               const kernels::GridSettings& grid);
 /// rad. The rotation of a body without stress, which the positions are compared with, is off by
 /// ½ kFlightAngle² of a radius at its end.
 inline constexpr double kFlightAngle = 0.2;

@@ -16,10 +16,9 @@ namespace uniphy {
 using AfterStep = std::function<void(const RungTask& task, double loss)>;
 
 /// What draws at the variables of least squares: a number that is off by 1 from `to` counts as much
-/// as positions whose root mean square error is `weight` of the size.
+/// as positions whose root mean square error is `weight` of the size. Both [variables], float64.
 struct Pull {
-  torch::Tensor to;
-  double weight = 0;
+  torch::Tensor to, weight;
 };
 
 /// The point of a problem's first `frames` that at most `iterations` of LevenbergMarquardt lead to

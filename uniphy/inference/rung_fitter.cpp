@@ -3,17 +3,24 @@
 #include <fmt/format.h>
 #include <torch/torch.h>
 
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <optional>
 
 #include "ops/kernels/base/error.hpp"
+#include "uniphy/inference/misfit.hpp"
 #include "uniphy/inference/observed_motion.hpp"
 #include "uniphy/report/progress.hpp"
 
 namespace uniphy {
 
 using torch::Tensor;
+
+namespace {
+/// Beyond this a pull holds a number as well as any larger one, and rounding spoils the equations.
+constexpr double kMostPull = 1e3;
+}  // namespace
 
 RungFitter::RungFitter(const Observation& observation, const std::string& name,
                        const FitVariables& latent, const FitOptions& options,
@@ -25,7 +32,10 @@ RungFitter::RungFitter(const Observation& observation, const std::string& name,
       adaptation_(adaptation),
       hooks_(hooks),
       state_(adaptation_state_file(hooks.state_file), hooks),
-      size_(observed_size(observation)) {
+      size_(observed_size(observation)),
+      first_motion_(estimate_motion(observation, observed_steps(observation, name),
+                                    observed_grid(observation, name))),
+      motion_(first_motion_.motion) {
   if (!can_be_adapted(latent)) return;
   for (const Rung rung : {Rung::latent, Rung::numbers, Rung::weights}) {
     adapted_.push_back(std::make_unique<AdaptedVariables>(latent, rung));
@@ -76,26 +86,87 @@ Tensor RungFitter::work(Rung rung, const std::string& name, int steps, const Imp
 }
 
 Tensor RungFitter::least_squares(const Observation& seen, std::ptrdiff_t frames, Rung rung,
-                                 const Tensor& start, const Pull& pull, const std::string& task,
-                                 int iterations, bool with_motion) {
+                                 const Tensor& start, const Tensor& to, double pull,
+                                 const std::string& task, int iterations, bool with_motion) {
   const FitOptions options = rung_options(true);
   const FitVariables& variables = of(rung);
   const FitProblem problem(seen, name_, variables, options, &motion_);
   const Tensor still = torch::zeros({with_motion ? FitProblem::kMotion : 0}, torch::kFloat64);
   const Tensor from = torch::cat({start, still});
-  std::optional<StartCorrection> starts;
-  try {
-    if (problem.fits_starts()) starts.emplace(problem.start_correction(from, frames));
-  } catch (const Error&) {  // the roll-out fails there, and its starts are left as they are
+  const std::optional<StartCorrection> starts = starts_at(problem, from, frames);
+  Pull all{to, torch::full_like(to, pull)};
+  if (with_motion) {
+    all.to = torch::cat({to, problem.change_to(first_motion_.motion)});
+    all.weight =
+        torch::cat({all.weight, motion_pull(problem, from, frames, starts ? &*starts : nullptr)});
   }
   const int columns = static_cast<int>(from.numel());
   const int roll_outs = iterations * (columns + LevenbergMarquardt::kTrials);
   const Tensor point = work(rung, task, roll_outs, [&](RungTask& t, const AfterStep& after) {
-    return uniphy::least_squares(problem, from, {torch::cat({pull.to, still}), pull.weight}, frames,
-                                 iterations, starts ? &*starts : nullptr, t, after);
+    return uniphy::least_squares(problem, from, all, frames, iterations,
+                                 starts ? &*starts : nullptr, t, after);
   });
   if (with_motion) motion_ = problem.motion_at(point);
   return point.slice(0, 0, variables.size()).clone();
+}
+
+std::optional<StartCorrection> RungFitter::starts_at(const FitProblem& problem, const Tensor& point,
+                                                     std::ptrdiff_t frames) const {
+  if (!problem.fits_starts()) return {};
+  try {
+    return problem.start_correction(point, frames);
+  } catch (const Error&) {
+    return {};
+  }
+}
+
+FitPosterior RungFitter::posterior(const Observation& seen, Rung rung, const Tensor& point) {
+  const FitOptions options = rung_options(true);
+  const FitVariables& variables = of(rung);
+  const FitProblem problem(seen, name_, variables, options, &motion_);
+  const Tensor at = torch::cat({point, torch::zeros({FitProblem::kMotion}, torch::kFloat64)});
+  const std::optional<StartCorrection> starts = starts_at(problem, at, seen.frames);
+  std::vector<std::int64_t> columns;
+  if (can_be_adapted(latent_)) {
+    columns = this->variables(rung).leading();
+  } else {
+    for (int k = 0; k < variables.size(); ++k) columns.push_back(k);
+  }
+  for (int k = 0; k < FitProblem::kMotion; ++k) columns.push_back(point.numel() + k);
+  const auto begin = std::chrono::steady_clock::now();
+  std::optional<Progress> progress;
+  PosteriorOptions how;
+  how.samples = adaptation_.samples;
+  how.noise = problem.noise_over_size();
+  if (hooks_.progress) {
+    progress.emplace("posterior", 0, "samples");
+    how.progress = [&](int done) { progress->update(done); };
+  }
+  FitPosterior result = fit_posterior(
+      [&](const Tensor& u) {
+        return problem.residuals(u, seen.frames, starts ? &*starts : nullptr);
+      },
+      at, columns, FitProblem::kMotion, problem.seen(seen.frames), how);
+  const std::chrono::duration<double> time = std::chrono::steady_clock::now() - begin;
+  report(rung).roll_outs += result.evaluations;
+  report(rung).seconds += time.count();
+  return result;
+}
+
+Tensor RungFitter::motion_pull(const FitProblem& problem, const Tensor& point,
+                               std::ptrdiff_t frames, const StartCorrection* starts) const {
+  const double noise = problem.noise_over_size();
+  const Tensor r = problem.residuals(point, frames, starts);
+  const double misfit = r.defined() ? r.square().sum().item<double>() : 0;
+  const double allowed = (starts != nullptr ? kNoiseAllowance : 2) * noise;
+  const double beside = std::max(0.0, misfit - allowed * allowed);
+  const double error = std::sqrt(noise * noise / problem.seen(frames) + beside);
+  Tensor weight = torch::empty({FitProblem::kMotion}, torch::kFloat64);
+  for (int k = 0; k < FitProblem::kMotion; ++k) {
+    const double unit = k < 3 ? FitProblem::kLinearUnit : FitProblem::kAngularUnit;
+    weight[k] = std::min(error * unit / first_motion_.spread[k], kMostPull);
+  }
+  return weight;
 }
 
 Tensor RungFitter::start_shift(const Observation& seen, Rung rung, const Tensor& point) const {

@@ -3,11 +3,13 @@
 #include <torch/types.h>
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "uniphy/inference/adaptation.hpp"
 #include "uniphy/inference/adaptation_state.hpp"
+#include "uniphy/inference/observed_motion.hpp"
 #include "uniphy/inference/rung_fit.hpp"
 
 namespace uniphy {
@@ -28,16 +30,18 @@ class RungFitter {
   void set_motion(const RigidMotion& motion) { motion_ = motion; }
   const RigidMotion& motion() const { return motion_; }
   /// The point that least squares on the first `frames` of `seen`, the observation or its first
-  /// part, lead to; where asked for, with the initial velocity, which then is that of all
-  /// roll-outs. `task` is unique within the rung.
+  /// part, lead to, pulled to `to` by `pull`; where asked for, with the initial velocity, which
+  /// then is that of all roll-outs. `task` is unique within the rung.
   torch::Tensor least_squares(const Observation& seen, std::ptrdiff_t frames, Rung rung,
-                              const torch::Tensor& start, const Pull& pull, const std::string& task,
-                              int iterations, bool with_motion);
+                              const torch::Tensor& start, const torch::Tensor& to, double pull,
+                              const std::string& task, int iterations, bool with_motion);
   /// δ [points, 3] of the starts of `seen` by the law at a point (StartCorrection::correction).
   torch::Tensor start_shift(const Observation& seen, Rung rung, const torch::Tensor& point) const;
   /// The same of all weights, by at most `epochs` roll-outs with gradients over all frames.
   torch::Tensor descend(const Observation& seen, const torch::Tensor& start,
                         const std::string& task, int epochs);
+  /// What `seen` says about z and the law's own numbers at a point, with the initial velocity.
+  FitPosterior posterior(const Observation& seen, Rung rung, const torch::Tensor& point);
   /// Root of the mean square error over size of each of the first frames; infinite from where the
   /// roll-out fails.
   std::vector<double> roots(const torch::Tensor& point, Rung rung, std::ptrdiff_t frames) const;
@@ -53,6 +57,16 @@ class RungFitter {
  private:
   FitOptions rung_options(bool differences) const;
   const FitVariables& of(Rung rung) const;
+  /// How strongly the initial velocity is pulled to the one of the first frames, [kMotion]: what
+  /// that is known to against what a roll-out misses. Noise is independent from point to point;
+  /// what the law, the grid or the time step leave beside it is one error that all share, so that
+  /// such a misfit does not move a velocity that is known.
+  torch::Tensor motion_pull(const FitProblem& problem, const torch::Tensor& point,
+                            std::ptrdiff_t frames, const StartCorrection* starts) const;
+  /// Where the points start, by the flow at a point; nothing where that is known or the roll-out
+  /// fails.
+  std::optional<StartCorrection> starts_at(const FitProblem& problem, const torch::Tensor& point,
+                                           std::ptrdiff_t frames) const;
   template <class Improve>
   torch::Tensor work(Rung rung, const std::string& name, int steps, const Improve& improve);
 
@@ -64,6 +78,7 @@ class RungFitter {
   const FitHooks& hooks_;
   AdaptationState state_;
   double size_;
+  MotionEstimate first_motion_;  ///< from the first frames alone
   RigidMotion motion_;
   std::vector<std::unique_ptr<AdaptedVariables>> adapted_;  ///< of each rung; empty: analytic
   std::vector<RungReport> reports_;

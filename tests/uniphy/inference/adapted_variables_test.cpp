@@ -73,6 +73,20 @@ TEST(AdaptedVariables, ThePullLeavesTheLawsOwnNumbersFree) {
   EXPECT_NEAR(w.grad()[4].item<double>(), 1, 1e-12);
 }
 
+TEST(AdaptedVariables, TheLeadingNumbersAreTheCodeAndTheLawsOwn) {
+  const Rungs r;
+  EXPECT_EQ(r.latent.leading().size(), std::size_t(r.latent.size()));
+  EXPECT_EQ(r.numbers.leading().size(), std::size_t(r.numbers.size()));
+  const std::vector<std::int64_t> leading = r.weights.leading();
+  ASSERT_EQ(leading.size(), r.numbers.leading().size());
+  // The last of them is the last bias of the stress network on both rungs.
+  Tensor narrow = torch::zeros({r.numbers.size()}, torch::kFloat64);
+  narrow[r.numbers.size() - 1] = 0.3;
+  Tensor wide = torch::zeros({r.weights.size()}, torch::kFloat64);
+  wide[leading.back()] = 0.3;
+  EXPECT_TRUE(r.weights.widened(r.numbers, narrow).equal(wide));
+}
+
 TEST(TermSplit, LeavesTheStressToSecondOrder) {
   const Rungs r;
   const Tensor u = r.numbers.widened(r.latent, r.start);

@@ -22,8 +22,7 @@ Tensor curved(const Tensor& x) {
   return torch::stack({x[1] - 1, 1000 * (x[0] * x[1] - 2), x[0].square() - 4});
 }
 
-int steps_until_done(LevenbergMarquardt& optimizer,
-                     const LevenbergMarquardt::Residuals& residuals) {
+int steps_until_done(LevenbergMarquardt& optimizer, const Residuals& residuals) {
   int steps = 0;
   for (; steps < 50 && !optimizer.stuck() && optimizer.loss() > 1e-20; ++steps) {
     optimizer.step(residuals);

@@ -40,6 +40,35 @@ TEST(ObservedMotion, MoreFramesAverageOutNoise) {
   EXPECT_LT(error(8), 0.5 * error(1));
 }
 
+TEST(ObservedMotion, IsKnownToTheSpreadThatTheNoiseLeaves) {
+  testing::ObservedScene scene;
+  scene.motion.centre = {0.5, 0.6, 0.5};
+  scene.frames = 11;
+  const Observation truth = testing::observe(testing::elastic_body(), scene);
+  const auto steps = observed_steps(truth, "o");
+  const auto grid = observed_grid(truth, "o");
+  std::array<double, 6> error{}, spread{};
+  constexpr int kDraws = 40;
+  std::mt19937 random(1);
+  for (int draw = 0; draw < kDraws; ++draw) {
+    Observation o = truth;
+    std::normal_distribution<double> noise(0, 1e-3);
+    for (double& x : o.x) x += noise(random);
+    o.noise = 1e-3;
+    const MotionEstimate found = estimate_motion(o, steps, grid);
+    for (int k = 0; k < 6; ++k) {
+      const double off = k < 3 ? found.motion.linear[k] - scene.motion.linear[k]
+                               : found.motion.angular[k - 3] - scene.motion.angular[k - 3];
+      error[k] += off * off / kDraws;
+      spread[k] += found.spread[k] * found.spread[k] / kDraws;
+    }
+  }
+  for (int k = 0; k < 6; ++k) {
+    EXPECT_GT(spread[k], 0.7 * error[k]) << k;
+    EXPECT_LT(spread[k], 3 * error[k]) << k;
+  }
+}
+
 TEST(ObservedMotion, ContactIsSeenWhereGravityAloneDoesNotExplainTheMotion) {
   const testing::ObservedScene scene;
   const Observation o = testing::observe(testing::elastic_body(), scene);
