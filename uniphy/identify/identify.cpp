@@ -197,6 +197,7 @@ std::string identify_table(const std::vector<Identified>& rows) {
   }
   return text;
 }
+  picture.colour_label = "height in the first frame (m)";
 
 void identify(const IdentifyOptions& options, RunDirectory& out, Metrics& metrics) {
   const auto variables = options.variables.load();

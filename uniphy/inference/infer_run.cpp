@@ -242,6 +242,7 @@ ParticlePicture frames_picture(const std::vector<std::pair<std::string, const Tr
                                int columns) {
   ParticlePicture picture;
   picture.columns = columns;
+  picture.colour_label = "height in the first frame (m)";
   for (const auto& [name, trajectory] : rows) {
     for (int c = 0; c < columns; ++c) {
       const std::int64_t frame = (trajectory->frames - 1) * c / std::max(1, columns - 1);

@@ -71,13 +71,21 @@ void draw_frames(const std::filesystem::path& png, const std::filesystem::path& 
   const auto body = reader.read<std::int32_t>("body", {shape[1]});
   ParticlePicture picture;
   picture.columns = static_cast<int>(std::min<std::int64_t>(output.picture_frames, 6));
+  // Several bodies are told apart; of one, colours follow the particles.
+  const bool several = body.back() > 0;
+  std::vector<double> colour(body.begin(), body.end());
+  if (!several) {
+    const auto first = reader.read_rows<double>("x", {-1, shape[1], 3}, 0, 1);
+    for (std::size_t p = 0; p < colour.size(); ++p) colour[p] = first[3 * p + 1];
+    picture.colour_label = "height in the first frame (m)";
+  }
   if (!trajectory_failure(reader).empty()) picture.title = "incomplete";
   for (std::int64_t frame = 0; frame < shape[0]; ++frame) {
     if (!is_pictured(frame, shape[0], output.picture_frames)) continue;
     ParticlePanel panel;
     panel.caption = fmt::format("{:.3f} s", time[static_cast<std::size_t>(frame)]);
     panel.x = reader.read_rows<double>("x", {-1, shape[1], 3}, frame, 1);
-    if (body.back() > 0) panel.colour.assign(body.begin(), body.end());
+    panel.colour = colour;
     picture.panels.push_back(std::move(panel));
   }
   plot_particles(png, picture);
