@@ -76,9 +76,9 @@ Inference infer(const Observation& observation, const std::string& name,
   result.best_start = *std::min_element(result.fit.start_mse.begin(), result.fit.start_mse.end());
   result.explained = explains(result);
   if (result.fit.determined) {
-    result.reading = read_material(
-        result.fit.law, seen.dt,
-        strain_seen(objective->deformations(result.fit.law, result.fit.motion, seen.frames)));
+    std::vector<double> F = objective->deformations(result.fit.law, result.fit.motion, seen.frames);
+    result.reading = read_material(result.fit.law, seen.dt, strain_seen(F));
+    if (!seen.tracked()) result.deformation = std::move(F);
   }
   return result;
 }
@@ -262,6 +262,18 @@ ParticlePicture frames_picture(const std::vector<std::pair<std::string, const Tr
     }
   }
   return picture;
+}
+
+Playback fit_playback(const Inference& inference, const std::string& title) {
+  const Trajectory seen = observed_trajectory(inference.seen);
+  Trajectory fitted = inference.fitted;
+  fitted.F = inference.deformation;
+  const double wall = inference.seen.bound / double(inference.seen.grid);
+  return {title,
+          {motion_of("observed", seen), motion_of("fitted", fitted, "observed", seen)},
+          {},
+          wall,
+          1 - wall};
 }
 
 std::string fit_fingerprint(const Observation& observation, const FitVariables& variables,

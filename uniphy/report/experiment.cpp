@@ -231,7 +231,7 @@ void RunDirectory::draw(const std::string& name, const Chart& chart) const {
 void RunDirectory::write_table(const std::string& name, const std::string& title,
                                const std::string& text) const {
   write_text_file(file(name), text);
-  if (report_) report_->tables.push_back({title, text});
+  if (report_) report_->set_table(title, text);
 }
 
 int run_experiment(int argc, const char* const* argv, const ExperimentInfo& info,

@@ -60,7 +60,8 @@ class RunDirectory {
 
   /// Draws a chart as a PNG (plot_chart), and into the report where there is one.
   void draw(const std::string& name, const Chart& chart) const;
-  /// Writes a table in Markdown (or a text), and shows it in the report where there is one.
+  /// Writes a table in Markdown (or a text), and shows it in the report where there is one, in
+  /// place of one of the same title.
   void write_table(const std::string& name, const std::string& title,
                    const std::string& text) const;
   /// What --report shows; null without it, so that nothing is made for it in vain.

@@ -38,6 +38,8 @@ struct Report {
   std::vector<Playback> playbacks;
   std::vector<Chart> charts;
 
+  /// In place of the table of the same title, if there is one.
+  void set_table(const std::string& title, const std::string& text);
   bool empty() const { return tables.empty() && playbacks.empty() && charts.empty(); }
 };
 

@@ -10,10 +10,11 @@ namespace {
 /// Huffman's code and the repeats that deflate finds, against the entropy: up to 3 % longer on the
 /// motions of the README, and shorter where many bytes are equal.
 double entropy(const std::string& bytes) {
-  std::array<double, 256> count{};
+  std::array<std::int64_t, 256> count{};
   for (const char c : bytes) ++count[static_cast<unsigned char>(c)];
   double bits = 0;
-  for (const double n : count) {
+  for (const std::int64_t count_of_one : count) {
+    const auto n = static_cast<double>(count_of_one);
     if (n > 0) bits -= n * std::log2(n / static_cast<double>(bytes.size()));
   }
   return bits / 8;
@@ -31,7 +32,7 @@ std::uint16_t difference_of(std::uint16_t code) {
 
 std::uint16_t quantised(double x, double low, double side, int bits) {
   const double top = (1 << bits) - 1;
-  return static_cast<std::uint16_t>(std::lround(std::clamp((x - low) / side, 0.0, 1.0) * top));
+  return static_cast<std::uint16_t>(std::clamp((x - low) / side, 0.0, 1.0) * top + 0.5);
 }
 
 /// The whole numbers of one frame, [3, particles]; hidden ones stay as they are in `q`.
@@ -130,6 +131,8 @@ Stream encode_positions(const Motion& motion, const Box& box, const CodecLevel& 
   const auto size = static_cast<std::size_t>(3 * kept_particles(motion, level));
   std::vector<std::uint16_t> before(size, 0), last(size, 0), now(size, 0);
   Stream stream;
+  stream.low.reserve(static_cast<std::size_t>(kept_frames(motion, level)) * size);
+  stream.high.reserve(stream.low.capacity());
   for (std::int64_t f = 0; f < kept_frames(motion, level); ++f) {
     quantise_frame(motion, f * level.frame_stride, box, level, now);
     for (std::size_t i = 0; i < size; ++i) {

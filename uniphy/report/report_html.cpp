@@ -59,12 +59,13 @@ std::string section(const std::string& id, const std::string& title, const std::
                      html);
 }
 
-/// A section that is closed at first.
-std::string details(const std::string& id, const std::string& title, const std::string& html) {
+/// A section that can be closed.
+std::string details(const std::string& id, const std::string& title, bool open,
+                    const std::string& html) {
   return fmt::format(
-      "<section id=\"{}\"><details>\n<summary><h2>{}</h2></summary>\n{}</details>"
+      "<section id=\"{}\"><details{}>\n<summary><h2>{}</h2></summary>\n{}</details>"
       "</section>\n",
-      id, html_escaped(title), html);
+      id, open ? " open" : "", html_escaped(title), html);
 }
 
 std::string tables_html(const Report& report) {
@@ -75,14 +76,14 @@ std::string tables_html(const Report& report) {
   return html;
 }
 
-std::string metrics_html(const Metrics& metrics) {
+std::string metrics_html(const Metrics& metrics, bool open) {
   if (metrics.entries().empty()) return "";
   std::string html = "<div class=\"wide\"><table>\n";
   for (const auto& [name, value] : metrics.entries()) {
     html += fmt::format("<tr><td>{}</td><td class=\"number\">{}</td></tr>\n", html_escaped(name),
                         std::isfinite(value) ? fmt::format("{:.6g}", value) : "–");
   }
-  return details("metrics", "Metrics", html + "</table></div>\n");
+  return details("metrics", "Metrics", open, html + "</table></div>\n");
 }
 
 /// The parts of the page that do not depend on how finely the motions are written.
@@ -99,14 +100,23 @@ Places places_of(const Report& report, const ReportRun& run) {
           {"tables", tables_html(report)},
           {"player", report.playbacks.empty() ? "" : section("player", "Motions", "")},
           {"charts", report.charts.empty() ? "" : section("charts", "Charts", "")},
-          {"metrics", metrics_html(run.metrics)},
-          {"config", details("config", "Configuration",
+          {"metrics", metrics_html(run.metrics, report.empty())},
+          {"config", details("config", "Configuration", false,
                              "<pre class=\"wide\">" + html_escaped(run.config) + "</pre>\n")},
           {"charts-json", charts_json(report.charts)},
           {"script", script_text(page::script)}};
 }
 
 }  // namespace
+
+void Report::set_table(const std::string& title, const std::string& text) {
+  for (ReportTable& table : tables) {
+    if (table.title != title) continue;
+    table.text = text;
+    return;
+  }
+  tables.push_back({title, text});
+}
 
 std::string report_html(const Report& report, const ReportRun& run, const std::string& three_js,
                         std::size_t maximum_bytes) {

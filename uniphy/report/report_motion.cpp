@@ -107,4 +107,14 @@ Motion motion_of(const std::string& name, const Trajectory& trajectory,
   return record({name, trajectory.body}, trajectory, same ? &reference : nullptr, reference_name);
 }
 
+Motion motion_of(const std::string& name, const Observation& observation) {
+  MotionRecorder recorder(
+      name, std::vector<std::int32_t>(static_cast<std::size_t>(observation.points())));
+  for (std::int64_t f = 0; f < observation.frames; ++f) {
+    recorder.add(observation.time[static_cast<std::size_t>(f)], observation.positions(f), nullptr,
+                 nullptr);
+  }
+  return recorder.finish();
+}
+
 }  // namespace uniphy

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "uniphy/io/observation.hpp"
 #include "uniphy/io/trajectory.hpp"
 #include "uniphy/report/plastic_strain.hpp"
 
@@ -58,5 +59,7 @@ Motion motion_of(const std::string& name, const Trajectory& trajectory);
 /// particles and frames; without where they differ.
 Motion motion_of(const std::string& name, const Trajectory& trajectory,
                  const std::string& reference_name, const Trajectory& reference);
+/// The observed points.
+Motion motion_of(const std::string& name, const Observation& observation);
 
 }  // namespace uniphy

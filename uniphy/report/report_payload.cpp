@@ -48,36 +48,34 @@ class Blobs {
   std::string html_;
 };
 
-/// The value that all but a thousandth stay below.
-double high_of(const std::vector<Playback>& playbacks, std::vector<float> Motion::*values) {
+/// The value that this share of all stays below.
+double high_of(const Playback& playback, std::vector<float> Motion::*values, double share) {
   std::vector<float> all;
-  for (const Playback& playback : playbacks) {
-    for (const Motion& motion : playback.motions) {
-      for (const float value : motion.*values) {
-        if (std::isfinite(value)) all.push_back(value);
-      }
+  for (const Motion& motion : playback.motions) {
+    for (const float value : motion.*values) {
+      if (std::isfinite(value)) all.push_back(value);
     }
   }
   if (all.empty()) return 0;
-  const auto at = all.begin() + static_cast<std::ptrdiff_t>(0.999 * double(all.size() - 1));
+  const auto at = all.begin() + static_cast<std::ptrdiff_t>(share * double(all.size() - 1));
   std::nth_element(all.begin(), at, all.end());
   return *at;
 }
 
-struct Scales {
+/// A playback, and what stands side by side in it has in common.
+struct Shown {
+  explicit Shown(const Playback& shown) : playback(shown), box(box_of(shown.motions)) {
+    strain = {0, std::max(kLeastStrain, high_of(shown, &Motion::plastic_strain, 0.98)), false};
+    const double largest = high_of(shown, &Motion::error, 0.999);
+    // Equal motions have no error; any scale shows that.
+    const double high = largest > 0 ? largest : 1e-6;
+    error = {high / std::pow(10, kErrorDecades), high, true};
+  }
+
+  const Playback& playback;
+  Box box;
   Scale strain, error;
 };
-
-/// Of one playback: what stands side by side has one scale.
-Scales scales_of(const Playback& playback) {
-  Scales scales;
-  scales.strain = {0, std::max(kLeastStrain, high_of({playback}, &Motion::plastic_strain)), false};
-  const double error = high_of({playback}, &Motion::error);
-  // Equal motions have no error; any scale shows that.
-  const double high = error > 0 ? error : 1e-6;
-  scales.error = {high / std::pow(10, kErrorDecades), high, true};
-  return scales;
-}
 
 Json scale_json(const Scale& scale) {
   return {{"low", scale.low}, {"high", scale.high}, {"log", scale.log}};
@@ -91,8 +89,7 @@ Stream bodies_of(const Motion& motion, const CodecLevel& level) {
   return stream;
 }
 
-Json motion_json(const Motion& motion, const Box& box, const Scales& scales,
-                 const CodecLevel& level, Blobs& blobs) {
+Json motion_json(const Motion& motion, const Shown& shown, const CodecLevel& level, Blobs& blobs) {
   Json json;
   json["name"] = motion.name;
   json["frames"] = kept_frames(motion, level);
@@ -103,79 +100,76 @@ Json motion_json(const Motion& motion, const Box& box, const Scales& scales,
   }
   json["time"] = time;
   json["body"] = blobs.add(bodies_of(motion, level));
-  json["positions"] = blobs.add(encode_positions(motion, box, level));
+  json["positions"] = blobs.add(encode_positions(motion, shown.box, level));
   json["hidden"] = blobs.add(encode_hidden(motion, level));
   json["strain"] = nullptr;
   json["error"] = nullptr;
   if (!motion.plastic_strain.empty()) {
-    json["strain"] = blobs.add(encode_values(motion, motion.plastic_strain, scales.strain, level));
+    json["strain"] = blobs.add(encode_values(motion, motion.plastic_strain, shown.strain, level));
   }
   if (!motion.error.empty()) {
-    json["error"] = blobs.add(encode_values(motion, motion.error, scales.error, level));
+    json["error"] = blobs.add(encode_values(motion, motion.error, shown.error, level));
   }
   json["reference"] = motion.reference;
   return json;
 }
 
-Json playback_json(const Playback& playback, const CodecLevel& level, Blobs& blobs) {
-  const Box box = box_of(playback.motions);
-  const Scales scales = scales_of(playback);
-  Json json;
-  json["title"] = playback.title;
-  json["bodies"] = playback.bodies;
-  json["walls"] = {playback.low, playback.high};
-  json["low"] = {box.low[0], box.low[1], box.low[2]};
-  json["side"] = box.side;
-  json["positionBits"] = level.position_bits;
-  json["valueBits"] = level.value_bits;
-  json["strainScale"] = scale_json(scales.strain);
-  json["errorScale"] = scale_json(scales.error);
-  json["note"] = payload_note(playback, level);
-  json["motions"] = Json::array();
-  for (const Motion& motion : playback.motions) {
-    json["motions"].push_back(motion_json(motion, box, scales, level, blobs));
-  }
-  return json;
-}
-
-std::string playbacks_json(const std::vector<Playback>& playbacks, const CodecLevel& level,
-                           Blobs& blobs) {
-  Json json = Json::array();
-  for (const Playback& playback : playbacks) {
-    json.push_back(playback_json(playback, level, blobs));
-  }
-  return script_json(json.dump(-1, ' ', false, Json::error_handler_t::replace));
-}
-
-}  // namespace
-
-ReportPayload payload_of(const std::vector<Playback>& playbacks, std::size_t room) {
-  for (const CodecLevel& level : codec_levels()) {
-    // Entropy is counted at once; compression takes seconds.
-    Blobs estimate(false);
-    const std::string json = playbacks_json(playbacks, level, estimate);
-    if (estimate.least_size() + double(json.size()) > double(room)) continue;
-    Blobs blobs(true);
-    playbacks_json(playbacks, level, blobs);
-    ReportPayload payload{json, blobs.html(), level};
-    if (payload.size() <= room) return payload;
-  }
-  throw Error(
-      fmt::format("report: expected motions that fit into {} bytes, found none that do", room));
-}
-
-std::string payload_note(const Playback& playback, const CodecLevel& level) {
-  const double side = box_of(playback.motions).side;
+/// What the page says of what was rounded and left out.
+std::string note_of(const Shown& shown, const CodecLevel& level) {
   std::string note = fmt::format("Positions are rounded to {:.2g} mm",
-                                 1e3 * side / ((1 << level.position_bits) - 1));
+                                 1e3 * shown.box.side / ((1 << level.position_bits) - 1));
   std::int64_t frames = 1, particles = 1;
-  for (const Motion& motion : playback.motions) {
+  for (const Motion& motion : shown.playback.motions) {
     frames = std::max(frames, motion.frame_stride * level.frame_stride);
     particles = std::max(particles, motion.particle_stride * level.particle_stride);
   }
   if (frames > 1) note += fmt::format("; one of {} frames is shown", frames);
   if (particles > 1) note += fmt::format("; one of {} particles is shown", particles);
   return note + ".";
+}
+
+Json playback_json(const Shown& shown, const CodecLevel& level, Blobs& blobs) {
+  const Playback& playback = shown.playback;
+  Json json;
+  json["title"] = playback.title;
+  json["bodies"] = playback.bodies;
+  json["walls"] = {playback.low, playback.high};
+  json["low"] = {shown.box.low[0], shown.box.low[1], shown.box.low[2]};
+  json["side"] = shown.box.side;
+  json["positionBits"] = level.position_bits;
+  json["valueBits"] = level.value_bits;
+  json["strainScale"] = scale_json(shown.strain);
+  json["errorScale"] = scale_json(shown.error);
+  json["note"] = note_of(shown, level);
+  json["motions"] = Json::array();
+  for (const Motion& motion : playback.motions) {
+    json["motions"].push_back(motion_json(motion, shown, level, blobs));
+  }
+  return json;
+}
+
+std::string playbacks_json(const std::vector<Shown>& all, const CodecLevel& level, Blobs& blobs) {
+  Json json = Json::array();
+  for (const Shown& shown : all) json.push_back(playback_json(shown, level, blobs));
+  return script_json(json.dump(-1, ' ', false, Json::error_handler_t::replace));
+}
+
+}  // namespace
+
+ReportPayload payload_of(const std::vector<Playback>& playbacks, std::size_t room) {
+  const std::vector<Shown> shown(playbacks.begin(), playbacks.end());
+  for (const CodecLevel& level : codec_levels()) {
+    // Entropy is counted at once; compression takes seconds.
+    Blobs estimate(false);
+    const std::string json = playbacks_json(shown, level, estimate);
+    if (estimate.least_size() + double(json.size()) > double(room)) continue;
+    Blobs blobs(true);
+    playbacks_json(shown, level, blobs);
+    ReportPayload payload{json, blobs.html(), level};
+    if (payload.size() <= room) return payload;
+  }
+  throw Error(
+      fmt::format("report: expected motions that fit into {} bytes, found none that do", room));
 }
 
 }  // namespace uniphy

@@ -21,7 +21,4 @@ struct ReportPayload {
 /// At the finest level at which it takes at most `room` bytes. Throws Error where there is none.
 ReportPayload payload_of(const std::vector<Playback>& playbacks, std::size_t room);
 
-/// What the page says of what was left out, or nothing: "positions to 0.1 mm; every 2nd frame".
-std::string payload_note(const Playback& playback, const CodecLevel& level);
-
 }  // namespace uniphy

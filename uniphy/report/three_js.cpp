@@ -28,7 +28,7 @@ std::string find_three_js(const std::vector<std::filesystem::path>& files) {
   }
   throw Error(
       fmt::format("--report: expected three.js at {}, found none: apt install libjs-three, "
-                  "or set {} to the file three.min.js",
+                  "set {} to the file three.min.js, or leave the report out (--no-report)",
                   files.empty() ? "" : files.front().string(), kThreeJsVariable));
 }
 

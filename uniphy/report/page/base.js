@@ -35,6 +35,11 @@ function powerOfTen(exponent) {
   return "10" + (exponent < 0 ? "⁻" : "") + digits;
 }
 
+/// "m^2" as m².
+function withPowers(text) {
+  return text.replace(/\^([0-9]+)/g, (all, digits) => digits.replace(/./g, d => superscripts[d]));
+}
+
 /// Four digits, with a power of ten where the number is large or small.
 function numberText(value, digits = 4) {
   if (value === null || !Number.isFinite(value)) return "–";
@@ -69,6 +74,16 @@ function viridisGradient() {
   const stops = [];
   for (let k = 0; k <= 10; ++k) stops.push(`rgb(${viridis(k / 10).join(",")}) ${10 * k}%`);
   return `linear-gradient(90deg, ${stops.join(", ")})`;
+}
+
+/// Calls `changed` when the width of an element has become another one.
+function watchWidth(node, changed) {
+  let width = node.clientWidth;
+  new ResizeObserver(() => requestAnimationFrame(() => {
+    if (node.clientWidth === width) return;
+    width = node.clientWidth;
+    changed();
+  })).observe(node);
 }
 
 /// "#scene=1&frame=10": how the page is to open.

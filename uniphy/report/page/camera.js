@@ -100,7 +100,7 @@ class Orbit {
   /// Sets a THREE.PerspectiveCamera for a panel of this shape.
   apply(camera, aspect) {
     const half = camera.fov * Math.PI / 360;
-    const fit = this.home.radius / Math.sin(Math.min(half, Math.atan(Math.tan(half) * aspect)));
+    const fit = 0.95 * this.home.radius / Math.sin(Math.min(half, Math.atan(Math.tan(half) * aspect)));
     const distance = fit / this.zoom;
     const flat = Math.cos(this.elevation) * distance;
     const [x, y, z] = this.centre;

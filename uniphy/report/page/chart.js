@@ -1,18 +1,18 @@
 // A chart as SVG: lines and points, a legend that hides them, and a read-out by mouse or keys.
 
-const chartMargin = {top: 10, right: 16, bottom: 44, left: 70};
+const chartMargin = {top: 10, right: 16, bottom: 44, left: 56};
 
 class ChartView {
   constructor(chart) {
     this.chart = chart;
     this.hidden = new Set();
-    this.title = element("h3", {}, chart.title);
+    this.xLabel = withPowers(chart.xLabel);
+    this.yLabel = withPowers(chart.yLabel);
     this.readOut = element("div", {class: "read-out", "aria-live": "polite"});
     this.box = element("div", {});
-    this.node = element("div", {class: "chart"}, this.title, this.legend(), this.box, this.readOut);
-    this.idle = "Move the mouse over the chart, or focus it and use the arrow keys, to read it off.";
-    this.readOut.textContent = this.idle;
-    new ResizeObserver(() => this.draw()).observe(this.box);
+    this.node = element("div", {class: "chart"}, element("h3", {}, chart.title), this.legend(),
+      element("div", {class: "y-label"}, "↑ " + this.yLabel), this.box, this.readOut);
+    watchWidth(this.box, () => this.draw());
   }
 
   styleOf(index) {
@@ -53,7 +53,8 @@ class ChartView {
   }
 
   draw() {
-    const width = Math.max(this.box.clientWidth, 240), height = Math.round(Math.min(380, 0.62 * width + 40));
+    const width = Math.max(this.box.clientWidth, 240);
+    const height = Math.round(Math.min(380, 0.62 * width + 40));
     if (width === this.width && this.hidden.size === this.drawnHidden) return;
     [this.width, this.height, this.drawnHidden] = [width, height, this.hidden.size];
     const shown = this.chart.series.filter((s, i) => !this.hidden.has(i));
@@ -61,18 +62,20 @@ class ChartView {
     this.x = new Axis(shown.flatMap(s => s.x), this.chart.logX, left, width - right);
     this.y = new Axis(shown.flatMap(s => s.y), this.chart.logY, height - bottom, top);
     this.svg = svgElement("svg", {viewBox: `0 0 ${width} ${height}`, height, tabindex: 0, role: "img",
-      "aria-label": `${this.chart.title}: ${this.chart.yLabel} over ${this.chart.xLabel}`});
+      "aria-label": `${this.chart.title}: ${this.yLabel} over ${this.xLabel}`});
     this.drawAxes();
     this.points = [];
     this.taken = [];
-    this.chart.series.forEach((series, i) => { if (!this.hidden.has(i)) this.drawSeries(series, i); });
-    this.chart.series.forEach((series, i) => { if (!this.hidden.has(i)) this.drawNames(series); });
+    shown.forEach(series => this.drawSeries(series));
+    shown.forEach(series => this.drawNames(series));
     this.cross = svgElement("g", {"pointer-events": "none"});
     this.svg.append(this.cross);
     this.svg.addEventListener("pointermove", event => this.pointed(event));
     this.svg.addEventListener("pointerleave", () => this.select(null));
     this.svg.addEventListener("keydown", event => this.key(event));
     this.box.replaceChildren(this.svg);
+    const last = this.selected;
+    this.select(last ? this.points.find(p => p.series === last.series && p.k === last.k) : null);
   }
 
   drawAxes() {
@@ -89,19 +92,11 @@ class ChartView {
       text(left - 6, this.y.at(value) + 4, "end", label);
     }
     line(`M${left} ${top}V${height - bottom}H${width - right}`, "axis");
-    text((left + width - right) / 2, height - 6, "middle", this.chart.xLabel);
-    const middle = (top + height - bottom) / 2;
-    const label = svgElement("text", {x: 14, y: middle, "text-anchor": "middle",
-                                      transform: `rotate(-90 14 ${middle})`}, this.chart.yLabel);
-    // A long label is pressed together rather than cut off.
-    if (this.chart.yLabel.length * 6.3 > height) {
-      label.setAttribute("textLength", height - 8);
-      label.setAttribute("lengthAdjust", "spacingAndGlyphs");
-    }
-    this.svg.append(label);
+    text((left + width - right) / 2, height - 6, "middle", this.xLabel + " →");
   }
 
-  drawSeries(series, index) {
+  drawSeries(series) {
+    const index = this.chart.series.indexOf(series);
     const {colour, again} = this.styleOf(index);
     let path = "", drawing = false;
     series.x.forEach((x, k) => {
@@ -131,13 +126,16 @@ class ChartView {
     const edge = this.width - chartMargin.right;
     for (const {at, k} of this.points.filter(p => p.series === series)) {
       const wide = 6.4 * series.names[k].length;
-      const places = [[7, -4], [7, 14], [-7 - wide, -4], [-7 - wide, 14], [-wide / 2, -9], [-wide / 2, 20]];
-      const free = places.map(([dx, dy]) => [at[0] + dx, at[1] + dy - 10, at[0] + dx + wide, at[1] + dy + 2])
+      const places = [[7, -4], [7, 14], [-7 - wide, -4], [-7 - wide, 14], [-wide / 2, -9],
+                      [-wide / 2, 20]];
+      const free = places.map(([dx, dy]) => [at[0] + dx, at[1] + dy])
+        .map(([x, y]) => [x, y - 10, x + wide, y + 2])
         .find(b => b[0] > chartMargin.left && b[2] < edge && b[1] > 0 &&
                    b[3] < this.height - chartMargin.bottom && !this.taken.some(t => overlap(t, b)));
       if (!free) continue;
       this.taken.push(free);
-      this.svg.append(svgElement("text", {x: free[0], y: free[3] - 2, "font-size": 11}, series.names[k]));
+      const place = {x: free[0], y: free[3] - 2, "font-size": 11};
+      this.svg.append(svgElement("text", place, series.names[k]));
     }
   }
 
@@ -170,16 +168,17 @@ class ChartView {
     this.selected = point;
     this.cross.replaceChildren();
     if (!point) {
-      this.readOut.textContent = this.idle;
+      this.readOut.textContent = "";
       return;
     }
     const {at: [x, y], series, k} = point, {top, right, bottom, left} = chartMargin;
+    const lines = `M${x} ${top}V${this.height - bottom}M${left} ${y}H${this.width - right}`;
     this.cross.append(
-      svgElement("path", {class: "cross", d: `M${x} ${top}V${this.height - bottom}M${left} ${y}H${this.width - right}`}),
+      svgElement("path", {class: "cross", d: lines}),
       svgElement("circle", {cx: x, cy: y, r: 5, fill: "none", stroke: "#1b1f24", "stroke-width": 2}));
     const name = [series.label, series.names && series.names[k]].filter(Boolean).join(", ");
     this.readOut.replaceChildren(element("b", {}, name), name ? ": " : "",
-      `${this.chart.xLabel} ${numberText(series.x[k])}, ${this.chart.yLabel} ${numberText(series.y[k])}` +
+      `${this.xLabel} ${numberText(series.x[k])}, ${this.yLabel} ${numberText(series.y[k])}` +
       (series.colour ? `, ${this.chart.colourLabel} ${numberText(series.colour[k])}` : ""));
   }
 }

@@ -1,5 +1,5 @@
-// Fills the page, then does what the address asks for: #scene=0&frame=10&colour=speed opens a
-// motion at a frame, and tests add check=1 (count the pixels drawn) or time=60 (time so many frames).
+// Fills the page, then does what the address asks for: #scene=1&frame=10&colour=speed opens a motion
+// at a frame, coloured so; check, time and play are for tests (check.js).
 
 async function showMotions(options) {
   const section = document.getElementById("player");
@@ -14,43 +14,36 @@ async function showMotions(options) {
     return null;
   }
   await player.open(Number(options.get("scene") || 0));
+  if (!player.playback) return null;
   if (options.has("colour")) player.recolour(options.get("colour"));
-  if (options.has("frame")) player.seek(Math.min(Number(options.get("frame")), player.scrubber.max));
+  if (options.has("frame")) {
+    player.scrubber.value = options.get("frame");
+    player.scrubber.dispatchEvent(new Event("input"));
+  }
   return player;
 }
 
-/// Milliseconds that a frame takes until its pixels can be read.
-function timeFrames(player, count) {
-  const begin = performance.now();
-  for (let i = 0; i < count; ++i) {
-    player.seek(i % player.playback.leader.frames);
-    player.draw();
-    player.stage.renderer.getContext().readPixels(0, 0, 1, 1, 0x1908, 0x1401, new Uint8Array(4));
-  }
-  return (performance.now() - begin) / count;
+/// The charts of the page.
+function showCharts() {
+  const section = document.getElementById("charts");
+  if (!section) return [];
+  const grid = element("div", {class: "charts"});
+  section.append(element("p", {class: "note"}, "Move the mouse over a chart, or focus it and use " +
+    "the arrow keys, to read it off. A click on a name hides its line."), grid);
+  const views = dataOf("charts-data").map(chart => new ChartView(chart));
+  grid.append(...views.map(view => view.node));
+  views.forEach(view => view.draw());  // now that each has its width
+  return views;
 }
 
 async function main() {
   const options = hashOptions();
-  const charts = document.getElementById("charts");
-  if (charts) {
-    const grid = element("div", {class: "charts"});
-    charts.append(grid);
-    for (const chart of dataOf("charts-data")) {
-      const view = new ChartView(chart);
-      grid.append(view.node);
-      view.draw();
-    }
-  }
+  const charts = showCharts();
   const player = await showMotions(options);
-  if (player && options.has("time")) {
-    root.dataset.frameMs = timeFrames(player, Number(options.get("time"))).toFixed(2);
-  }
-  if (player) {
-    player.draw();
-    if (options.has("check")) root.dataset.pixels = player.stage.drawnPixels();
-  }
-  root.dataset.marks = document.querySelectorAll(".chart svg path, .chart svg circle").length;
+  if (player) player.draw();
+  if (player && options.has("time")) timePage(player, Number(options.get("time")));
+  if (player && options.has("play")) playPage(player, Number(options.get("play")));
+  if (options.has("check")) checkPage(player, charts);
   root.dataset.state = "ready";
 }
 

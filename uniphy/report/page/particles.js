@@ -22,7 +22,7 @@ void main() {
   float square = dot(at, at);
   if (square > 1.0) discard;
   vec3 normal = vec3(at.x, -at.y, sqrt(1.0 - square));
-  float light = 0.5 + 0.5 * max(0.0, dot(normal, vec3(-0.35, 0.62, 0.70)));
+  float light = 0.6 + 0.4 * max(0.0, dot(normal, vec3(-0.35, 0.62, 0.70)));
   gl_FragColor = vec4(mix(lit * light, vec3(0.93), 0.45 * away), 1.0);
 }`;
 
@@ -58,6 +58,19 @@ function wallLines([low, high]) {
   return new THREE.LineSegments(geometry, material);
 }
 
+/// All numbers below n, such that the first few of them are spread over all particles.
+function spreadOrder(n) {
+  const order = new Uint32Array(n);
+  let step = Math.max(1, Math.round(0.618 * n));
+  while (greatestDivisor(step, n) > 1) ++step;
+  for (let i = 0, p = 0; i < n; ++i, p = (p + step) % n) order[i] = p;
+  return order;
+}
+
+function greatestDivisor(a, b) {
+  return b === 0 ? a : greatestDivisor(b, a % b);
+}
+
 class MotionView {
   constructor(playback, motion) {
     this.playback = playback;
@@ -65,15 +78,17 @@ class MotionView {
     this.places = new Float32Array(motion.particles);
     this.geometry = new THREE.BufferGeometry();
     this.positions = new THREE.BufferAttribute(new Uint16Array(3 * motion.particles), 3, true);
-    this.colours = new THREE.BufferAttribute(new Uint8Array(4 * motion.particles), 4, true);
+    this.words = new Uint32Array(motion.particles);  // a colour each; 0 where it is hidden
+    this.colours = new THREE.BufferAttribute(new Uint8Array(this.words.buffer), 4, true);
     this.geometry.setAttribute("position", this.positions);
     this.geometry.setAttribute("colour", this.colours);
+    this.geometry.setIndex(new THREE.BufferAttribute(spreadOrder(motion.particles), 1));
+    this.radius = 0.62 * spacingOf(playback, motion);
     this.material = new THREE.ShaderMaterial({
       vertexShader: particleVertex, fragmentShader: particleFragment,
       uniforms: {
         low: {value: new THREE.Vector3(...playback.low)}, scale: {value: 65535 * playback.step},
-        radius: {value: 0.62 * spacingOf(playback, motion)}, pixels: {value: 1},
-        nearest: {value: 0}, depth: {value: 1},
+        radius: {value: this.radius}, pixels: {value: 1}, nearest: {value: 0}, depth: {value: 1},
       },
     });
     const points = new THREE.Points(this.geometry, this.material);
@@ -82,20 +97,22 @@ class MotionView {
     this.scene.add(wallLines(playback.walls), points);
   }
 
+  /// Draws only a share of the particles, larger.
+  thin(share) {
+    this.geometry.setDrawRange(0, Math.ceil(share * this.motion.particles));
+    this.material.uniforms.radius.value = this.radius / Math.cbrt(share);
+  }
+
   show(frame, kind) {
     const {motion, playback} = this, n = motion.particles;
     this.positions.array.set(motion.x.subarray(3 * frame * n, 3 * (frame + 1) * n));
     this.positions.needsUpdate = true;
     colourKinds[kind].places(playback, motion, frame, this.places);
-    const colours = this.colours.array;
+    const table = kind === "body" ? bodyColours : scaleColours, top = table.length - 2;
+    const hidden = motion.hidden && motion.hidden.subarray(frame * n, (frame + 1) * n);
     for (let p = 0; p < n; ++p) {
-      const place = this.places[p];
-      const rgb = place < 0 ? unknownColour
-        : kind === "body" ? bodyColours[place] : scaleColours[Math.min(Math.round(255 * place), 255)];
-      colours[4 * p] = rgb[0];
-      colours[4 * p + 1] = rgb[1];
-      colours[4 * p + 2] = rgb[2];
-      colours[4 * p + 3] = motion.hidden && motion.hidden[frame * n + p] ? 0 : 255;
+      const place = kind === "body" ? this.places[p] : Math.round(top * Math.min(this.places[p], 1));
+      this.words[p] = hidden && hidden[p] ? 0 : table[place < 0 ? top + 1 : place];
     }
     this.colours.needsUpdate = true;
   }
@@ -107,16 +124,23 @@ class MotionView {
     });
   }
 }
-const bodyColours = palette.map(rgbOf);
-const scaleColours = Array.from({length: 256}, (unused, i) => viridis(i / 255));
+
+/// Colours as the words of an array of bytes, and at the end that of what is not known.
+function colourTable(colours) {
+  const bytes = [...colours, unknownColour].flatMap(rgb => [...rgb, 255]);
+  return new Uint32Array(new Uint8Array(bytes).buffer);
+}
+const bodyColours = colourTable(palette.map(rgbOf));
+const scaleColours = colourTable(Array.from({length: 256}, (unused, i) => viridis(i / 255)));
 
 class ParticleStage {
-  /// Throws where the browser has no WebGL.
-  constructor(canvas) {
+  /// Throws where the browser has no WebGL. `smooth`: lines without steps; of many particles, whose
+  /// edges it does not smooth, it would cost more than it gives.
+  constructor(canvas, smooth) {
     this.canvas = canvas;
-    this.renderer = new THREE.WebGLRenderer({canvas, antialias: true});
-    this.renderer.setScissorTest(true);
+    this.renderer = new THREE.WebGLRenderer({canvas, antialias: smooth});
     this.renderer.setClearColor(0xffffff);
+    this.renderer.autoClear = false;
     this.camera = new THREE.PerspectiveCamera(28, 1, 0.01, 10);
     this.views = [];
   }
@@ -132,6 +156,9 @@ class ParticleStage {
     const ratio = Math.min(window.devicePixelRatio || 1, 2);
     this.renderer.setPixelRatio(ratio);
     this.renderer.setSize(width, height, false);
+    this.renderer.setScissorTest(false);
+    this.renderer.clear();
+    this.renderer.setScissorTest(true);
     const from = this.canvas.getBoundingClientRect();
     this.views.forEach((view, i) => {
       const box = panels[i].getBoundingClientRect();

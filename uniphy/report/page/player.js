@@ -1,6 +1,9 @@
 // The player: panels side by side, one camera, one time.
 
 const framesASecond = 30;
+const smoothParticles = 10000;
+// Where a browser draws fewer than 30 pictures a second while it plays, fewer particles are drawn.
+const slowMs = 36, leastShare = 0.25;
 
 class Player {
   constructor(section, descriptions) {
@@ -10,9 +13,10 @@ class Player {
     this.kind = "speed";
     this.playing = false;
     this.build();
-    this.stage = new ParticleStage(this.canvas);
+    const particles = descriptions.map(d => d.motions.reduce((sum, m) => sum + m.particles, 0));
+    this.stage = new ParticleStage(this.canvas, Math.max(...particles) <= smoothParticles);
     this.orbit = new Orbit(this.canvas, () => this.request());
-    new ResizeObserver(() => this.layOut()).observe(section);
+    watchWidth(section, () => this.layOut());
   }
 
   build() {
@@ -61,10 +65,20 @@ class Player {
     this.choice.value = index;
     const opened = this.opened = (this.opened || 0) + 1;
     this.note.textContent = "Loading …";
-    const playback = await loadPlayback(this.descriptions[index]);
+    let playback;
+    try {
+      playback = await loadPlayback(this.descriptions[index]);
+    } catch (error) {
+      this.note.textContent = "This browser cannot unpack the motions: " + error.message;
+      fail(error);
+      return;
+    }
     if (opened !== this.opened) return;  // another one was chosen meanwhile
     this.playback = playback;
+    // Digits of the seconds in which frames differ.
+    this.decimals = Math.max(3, Math.ceil(-Math.log10(playback.duration || 1)) + 2);
     this.stage.load(playback);
+    this.share = 1;
     this.showPanels();
     this.colour.replaceChildren();
     for (const [name, kind] of Object.entries(colourKinds)) {
@@ -74,7 +88,7 @@ class Player {
     this.note.textContent = playback.note + " Drag to turn, drag with Shift or the right button " +
       "to move; the wheel zooms after a click, as + and − do.";
     this.lookAtAll();
-    const kept = colourKinds[this.kind].isThere(playback) && index !== undefined && opened > 1;
+    const kept = opened > 1 && colourKinds[this.kind].isThere(playback);
     this.recolour(kept ? this.kind : defaultKind(playback));
     this.seek(Math.min(this.frame, playback.leader.frames - 1));
   }
@@ -135,9 +149,16 @@ class Player {
     this.play.textContent = "❚❚ Pause";
     if (this.frame >= this.playback.leader.frames - 1) this.seek(0);
     this.begin();
+    let last = 0, mean = 0, counted = 0;
     const next = now => {
       if (!this.playing) return;
       this.began = this.began || now;
+      if (last) mean += (now - last - mean) / Math.min(++counted, 8);
+      last = now;
+      if (counted >= 8 && mean > slowMs && this.share > leastShare) {
+        this.thin(Math.max(leastShare, 0.7 * this.share));
+        [mean, counted] = [0, 0];
+      }
       const rate = Number(this.rate.value);
       const frame = this.first + Math.floor((now - this.began) / 1000 * rate);
       const count = this.playback.leader.frames;
@@ -153,7 +174,16 @@ class Player {
     this.began = 0;
   }
 
+  /// Draws only a share of the particles.
+  thin(share) {
+    this.share = share;
+    this.stage.views.forEach(view => view.thin(share));
+    root.dataset.share = share.toFixed(2);
+    this.request();
+  }
+
   pause() {
+    if (this.share < 1) this.thin(1);
     this.playing = false;
     this.play.textContent = "▶ Play";
   }
@@ -169,16 +199,18 @@ class Player {
   }
 
   draw() {
+    if (!this.playback) return;
     const {leader, motions} = this.playback;
     const time = leader.time[this.frame] - leader.start;
     const key = this.frame + this.kind;
     motions.forEach((motion, i) => {
       const frame = frameAt(motion, time);
       if (key !== this.shown) this.stage.views[i].show(frame, this.kind);
-      this.labels[i].textContent = `${numberText(motion.time[frame])} s`;
+      this.labels[i].textContent = `${motion.time[frame].toFixed(this.decimals)} s`;
     });
     this.shown = key;
     this.stage.draw(this.orbit, this.cells);
     root.dataset.frame = this.frame;
+    root.dataset.drawn = Number(root.dataset.drawn || 0) + 1;
   }
 }
