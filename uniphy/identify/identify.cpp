@@ -157,10 +157,9 @@ void show_motions(const std::vector<Identified>& rows, const std::vector<CasePic
     playback.title = fmt::format("{}: {}, then {}", p.material, row->shape, row->other_shape);
     playback.low = grid.bound * grid.dx();
     playback.high = 1 - playback.low;
-    playback.motions = {motion_of("observed", p.observed),
-                        motion_of("fitted", p.fitted, "observed", p.observed),
-                        motion_of("predicted", p.predicted, "the truth there", p.truth),
-                        motion_of("the truth there", p.truth)};
+    playback.motions = {
+        motion_of("observed", p.observed), motion_of("fitted", p.fitted, "observed", p.observed),
+        motion_of("predicted", p.predicted, "truth", p.truth), motion_of("truth", p.truth)};
     report.playbacks.push_back(std::move(playback));
   }
 }
@@ -197,7 +196,7 @@ void draw_pictures(const std::vector<CasePictures>& all, RunDirectory& out) {
   out.draw("loss.png", chart);
   ParticlePicture picture;
   picture.columns = 8;
-  picture.colour_label = "height in the first frame (m)";
+  picture.colour_label = kHeightInBody;
   picture.panel_pixels = 290;
   picture.low = 0.13;  // the walls stand at 0.15
   picture.high = 0.87;

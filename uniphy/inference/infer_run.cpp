@@ -242,21 +242,22 @@ ParticlePicture frames_picture(const std::vector<std::pair<std::string, const Tr
                                int columns) {
   ParticlePicture picture;
   picture.columns = columns;
-  picture.colour_label = "height in the first frame (m)";
+  picture.colour_label = kHeightInBody;
   for (const auto& [name, trajectory] : rows) {
+    // The last row has all that may be hidden in the others.
+    const Trajectory& whole =
+        rows.back().second->particles == trajectory->particles ? *rows.back().second : *trajectory;
+    const std::vector<double> heights =
+        heights_in_body({whole.positions(0), whole.positions(0) + 3 * whole.particles});
     for (int c = 0; c < columns; ++c) {
       const std::int64_t frame = (trajectory->frames - 1) * c / std::max(1, columns - 1);
       ParticlePanel panel;
       panel.caption = fmt::format("{} {:.0f} ms", name, 1e3 * trajectory->time[frame]);
-      // Colour follows the particles: height at the first frame, of the last row where it is
-      // hidden.
-      const Trajectory& whole = *rows.back().second;
       for (std::int64_t p = 0; p < trajectory->particles; ++p) {
         const double* x = trajectory->positions(frame) + 3 * p;
-        const double height = trajectory->positions(0)[3 * p + 1];
         if (std::isnan(x[0])) continue;
         panel.x.insert(panel.x.end(), x, x + 3);
-        panel.colour.push_back(std::isnan(height) ? whole.positions(0)[3 * p + 1] : height);
+        panel.colour.push_back(heights[p]);
       }
       picture.panels.push_back(std::move(panel));
     }

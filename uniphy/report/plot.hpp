@@ -55,6 +55,11 @@ struct ParticlePicture {
   double high = 1;
 };
 
+/// A colour that follows the particles: the height of each [particles, 3] from 0 of the lowest to 1
+/// of the highest, NaN of what is not there.
+std::vector<double> heights_in_body(const std::vector<double>& x);
+inline constexpr const char* kHeightInBody = "height within the body in the first frame";
+
 bool plot_particles(const std::filesystem::path& png, const ParticlePicture& picture);
 
 /// The picture coordinates of a point: x right, y up, z towards the camera.

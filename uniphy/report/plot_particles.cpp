@@ -170,6 +170,20 @@ Projected project_point(const ParticlePicture& picture, const double* point) {
           std::sin(e) * y + std::cos(e) * towards};
 }
 
+std::vector<double> heights_in_body(const std::vector<double>& x) {
+  double low = 1e300, high = -1e300;
+  for (std::size_t i = 1; i < x.size(); i += 3) {
+    if (!std::isfinite(x[i])) continue;
+    low = std::min(low, x[i]);
+    high = std::max(high, x[i]);
+  }
+  std::vector<double> heights;
+  for (std::size_t i = 1; i < x.size(); i += 3) {
+    heights.push_back(high > low || !std::isfinite(x[i]) ? (x[i] - low) / (high - low) : 0.5);
+  }
+  return heights;
+}
+
 bool plot_particles(const std::filesystem::path& png, const ParticlePicture& picture) {
   const int count = static_cast<int>(picture.panels.size());
   if (count == 0) throw Error(fmt::format("{}: expected at least one panel", png.string()));

@@ -143,6 +143,7 @@ Json playback_json(const Shown& shown, const CodecLevel& level, Blobs& blobs) {
   json["note"] = note_of(shown, level);
   json["motions"] = Json::array();
   for (const Motion& motion : playback.motions) {
+    if (motion.frames() == 0 || motion.particles == 0) continue;  // nothing to see
     json["motions"].push_back(motion_json(motion, shown, level, blobs));
   }
   return json;

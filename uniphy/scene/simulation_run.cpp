@@ -76,8 +76,8 @@ void draw_frames(const std::filesystem::path& png, const std::filesystem::path& 
   std::vector<double> colour(body.begin(), body.end());
   if (!several) {
     const auto first = reader.read_rows<double>("x", {-1, shape[1], 3}, 0, 1);
-    for (std::size_t p = 0; p < colour.size(); ++p) colour[p] = first[3 * p + 1];
-    picture.colour_label = "height in the first frame (m)";
+    colour = heights_in_body(first);
+    picture.colour_label = kHeightInBody;
   }
   if (!trajectory_failure(reader).empty()) picture.title = "incomplete";
   for (std::int64_t frame = 0; frame < shape[0]; ++frame) {

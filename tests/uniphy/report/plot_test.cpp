@@ -102,6 +102,12 @@ TEST(Plot, NamesThatWouldCoverEachOtherAreLeftOut) {
   EXPECT_LE(lines, 7);
 }
 
+TEST(Plot, HeightsAreFromTheLowestToTheHighest) {
+  const auto heights = heights_in_body({0, 2, 0, 0, 4, 0, NAN, NAN, NAN, 0, 3, 0});
+  EXPECT_THAT(heights, ::testing::ElementsAre(0, 1, ::testing::NanSensitiveDoubleEq(NAN), 0.5));
+  EXPECT_THAT(heights_in_body({0, 2, 0}), ::testing::ElementsAre(0.5));
+}
+
 TEST(Plot, AColourBarStandsUnderThePanels) {
   if (!gnuplot_available()) GTEST_SKIP() << "no gnuplot here";
   const testing::Scratch scratch;

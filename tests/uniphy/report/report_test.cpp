@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <random>
 
 #include "tests/uniphy/support/scratch.hpp"
 #include "uniphy/report/report_text.hpp"
@@ -96,6 +97,55 @@ TEST(Report, KeepsToItsSizeAndSaysWhatItLeftOut) {
               HasSubstr("expected tables and charts of at most 1000 bytes"));
   EXPECT_THAT(testing::error_of([&] { report_html(report, {}, kThree, rest + 10); }),
               HasSubstr("expected motions that fit"));
+}
+
+/// A cloud that falls, bounces and sways, with noise of 0.05 mm.
+Motion large_motion(const std::string& name, double sway) {
+  constexpr std::int64_t kParticles = 20'000, kFrames = 200;
+  std::mt19937 draw(5);
+  std::uniform_real_distribution<double> unit(0, 1);
+  std::vector<double> start(3 * kParticles);
+  for (double& x : start) x = 0.3 + 0.4 * unit(draw);
+  Motion motion;
+  motion.name = name;
+  motion.particles = kParticles;
+  motion.body.assign(kParticles, 0);
+  for (std::int64_t f = 0; f < kFrames; ++f) {
+    const double time = 0.004 * double(f);
+    motion.time.push_back(time);
+    const double height = 0.2 * std::abs(std::cos(5 * time)) - 0.2;
+    for (std::size_t i = 0; i < start.size(); ++i) {
+      const double swing = sway * time * std::sin(8 * start[i - i % 3] + 9 * time + double(i % 3));
+      motion.x.push_back(static_cast<float>(start[i] + swing + (i % 3 == 1 ? height : 0) +
+                                            5e-5 * (unit(draw) - 0.5)));
+      if (i % 3 != 0) continue;
+      motion.plastic_strain.push_back(static_cast<float>(std::abs(swing)));
+      motion.error.push_back(static_cast<float>(1e-4 + std::abs(swing) * 1e-2));
+    }
+  }
+  return motion;
+}
+
+TEST(Report, ThreeMotionsOfTwentyThousandParticlesKeepAllOfTheirFrames) {
+  Report report;
+  report.playbacks.push_back({"large",
+                              {large_motion("observed", 0.1), large_motion("fitted", 0.1),
+                               large_motion("predicted", 0.2)}});
+  report.playbacks[0].motions[0].plastic_strain.clear();
+  report.playbacks[0].motions[0].error.clear();
+  const std::string three(850'000, ' ');  // as long as three.min.js
+  const std::string html = report_html(report, {}, three);
+  RecordProperty("bytes", static_cast<int>(html.size()));
+  EXPECT_LE(html.size(), 20'000'000u);
+  EXPECT_THAT(html.substr(0, html.find("id=\"blob-0\"")), Not(HasSubstr("is shown")));
+}
+
+TEST(Report, LeavesOutAMotionWithoutFrames) {
+  Report report;
+  report.playbacks.push_back({"one of two", {example_motion(5, 0), example_motion(5, 3)}});
+  const std::string html = report_html(report, {}, kThree);
+  EXPECT_EQ(count_of(html, "\"frames\":"), 1u);
+  EXPECT_THAT(html, HasSubstr("\"frames\":3"));
 }
 
 TEST(Report, WithoutMotionsThereIsNoThreeJs) {

@@ -3,10 +3,11 @@
 
 async function showMotions(options) {
   const section = document.getElementById("player");
-  if (!section) return null;
+  const playbacks = dataOf("motions-data").filter(playback => playback.motions.length > 0);
+  if (!section || !playbacks.length) return null;
   let player;
   try {
-    player = new Player(section, dataOf("motions-data"));
+    player = new Player(section, playbacks);
   } catch (error) {
     section.replaceChildren(element("h2", {}, "Motions"), element("p", {class: "failure"},
       "Motions need WebGL, which this browser does not have or does not allow."));

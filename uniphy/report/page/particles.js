@@ -72,7 +72,8 @@ function greatestDivisor(a, b) {
 }
 
 class MotionView {
-  constructor(playback, motion) {
+  /// `spacing`: m, of the particles.
+  constructor(playback, motion, spacing) {
     this.playback = playback;
     this.motion = motion;
     this.places = new Float32Array(motion.particles);
@@ -83,7 +84,7 @@ class MotionView {
     this.geometry.setAttribute("position", this.positions);
     this.geometry.setAttribute("colour", this.colours);
     this.geometry.setIndex(new THREE.BufferAttribute(spreadOrder(motion.particles), 1));
-    this.radius = 0.62 * spacingOf(playback, motion);
+    this.radius = 0.62 * spacing;
     this.material = new THREE.ShaderMaterial({
       vertexShader: particleVertex, fragmentShader: particleFragment,
       uniforms: {
@@ -147,7 +148,11 @@ class ParticleStage {
 
   load(playback) {
     this.views.forEach(view => view.dispose());
-    this.views = playback.motions.map(motion => new MotionView(playback, motion));
+    const spacings = playback.motions.map(motion => spacingOf(playback, motion));
+    // A few tracked points are not blown up to fill the body.
+    const most = 1.5 * Math.min(...spacings);
+    this.views = playback.motions.map((motion, i) =>
+      new MotionView(playback, motion, Math.min(spacings[i], most)));
   }
 
   /// `panels`: the elements that the motions stand behind.
