@@ -5,10 +5,12 @@ set -euo pipefail
 packages=(
   build-essential cmake ninja-build ccache
   libtorch-dev libopenblas-dev libeigen3-dev libxsimd-dev
-  libhdf5-dev libyaml-cpp-dev nlohmann-json3-dev
+  libhdf5-dev zlib1g-dev libyaml-cpp-dev nlohmann-json3-dev
   libcli11-dev libspdlog-dev libfmt-dev
   libgtest-dev libgmock-dev libbenchmark-dev
   gnuplot-nox  # the charts and pictures of the reports
+  libjs-three  # three.js, which plays the motions of report.html
+  chromium  # in which a test opens report.html
   python3-torch python3-h5py  # torch.ops.uniphy in tests/python, experiments/algorithm2.py
   python3-numpy python3-mpmath pyflakes3  # coefficients of the activations, lint of Python files
   paraview python3-paraview  # pvpython, whose readers a test tries on a trajectory's XDMF

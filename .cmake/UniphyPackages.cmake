@@ -9,6 +9,7 @@ macro(uniphy_find_packages)
   find_package(spdlog REQUIRED)
   find_package(CLI11 REQUIRED)
   find_package(nlohmann_json REQUIRED)
+  find_package(ZLIB REQUIRED)
 
   # Header-only. Only the include directory: Debian 12's target also asks for a library that
   # does not exist (-lxtl).

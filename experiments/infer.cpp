@@ -9,6 +9,17 @@
 
 namespace {
 
+/// What is printed of the result, and the motions, in the report.
+void show(const uniphy::Inference& result, const uniphy::FitVariables& variables,
+          uniphy::Report* report) {
+  if (report == nullptr) return;
+  report->set_table("Result", fit_summary(result.fit, variables) +
+                                  (result.fit.determined ? belief_text(result.material) : ""));
+  const std::string rungs = rung_table(result.rung, result.rungs);
+  if (!rungs.empty()) report->set_table("Adaptation", rungs);
+  report->playbacks.push_back(fit_playback(result, "Fit"));
+}
+
 /// The adapted law where there is one; none of an earlier run where there is not.
 std::string write_adapted(const uniphy::Inference& result, const uniphy::Observation& observation,
                           const std::filesystem::path& model, uniphy::RunDirectory& out) {
@@ -46,12 +57,13 @@ void run(const uniphy::ObservationSource& observed, const uniphy::FitVariablesSo
   write_latent(out.file("latent.h5"),
                latent_of(result, observation, *variables, model, out.config_yaml()));
   write_trajectory(out.file("trajectory.h5"), result.fitted);
-  plot_chart(out.file("loss.png"), loss_chart(result.fit, *variables, "Inference"));
+  out.draw("loss.png", loss_chart(result.fit, *variables, "Inference"));
   write_misfit(out.file("residual.csv"), result.misfit);
-  plot_chart(out.file("residual.png"), misfit_chart(result.misfit));
+  out.draw("residual.png", misfit_chart(result.misfit));
   const Trajectory seen = observed_trajectory(result.seen);
   plot_particles(out.file("frames.png"),
                  frames_picture({{"observed", &seen}, {"fitted", &result.fitted}}, 5));
+  show(result, *variables, out.report());
   add_metrics(metrics, result, observation, *variables);
   std::error_code ignored;
   std::filesystem::remove(hooks.state_file, ignored);  // a finished fit is not resumed

@@ -4,6 +4,20 @@
 #include "uniphy/data/laboratory_view.hpp"
 #include "uniphy/report/experiment.hpp"
 
+namespace {
+
+void show(const uniphy::Observation& all, const uniphy::Observation& seen, uniphy::Report* report) {
+  if (report == nullptr) return;
+  const double wall = seen.bound / double(seen.grid);
+  report->playbacks.push_back({"Observation",
+                               {motion_of("all there is", all), motion_of("observed", seen)},
+                               {},
+                               wall,
+                               1 - wall});
+}
+
+}  // namespace
+
 int main(int argc, char** argv) {
   const uniphy::ExperimentInfo info{
       "uniphy_observe",
@@ -36,14 +50,16 @@ int main(int argc, char** argv) {
         view.seed = static_cast<std::uint64_t>(
             config.integer("seed", 1, between(0, 9e15), "", "of all that is drawn"));
         return [=](uniphy::RunDirectory& out, uniphy::Metrics& metrics) {
-          uniphy::Observation seen;
+          uniphy::Observation all, seen;
           try {
-            seen = laboratory_view(uniphy::read_observation(file), view);
+            all = uniphy::read_observation(file);
+            seen = laboratory_view(all, view);
           } catch (const uniphy::Error& error) {
             const std::string text = error.what(), name = file.string();
             throw uniphy::Error(text.rfind(name, 0) == 0 ? text : name + ": " + text);
           }
           write_observation(out.file("observation.h5"), seen);
+          show(all, seen, out.report());
           metrics.set("points", static_cast<double>(seen.points()));
           metrics.set("frames", static_cast<double>(seen.frames));
           metrics.set("noise", seen.noise);

@@ -7,7 +7,6 @@
 #include "uniphy/bench/goals.hpp"
 #include "uniphy/bench/roofline.hpp"
 #include "uniphy/bench/subjects.hpp"
-#include "uniphy/io/atomic_file.hpp"
 
 namespace uniphy::bench {
 namespace {
@@ -31,9 +30,9 @@ void run(const BenchOptions& options, RunDirectory& out, Metrics& metrics) {
   for (const Goal& goal : all) metrics.set(goal.metric, goal.measured);
   const std::string text = rows_table(report) + "\n" + goals_table(all);
   std::fputs(text.c_str(), stdout);
-  write_text_file(out.file("table.txt"), text);
+  out.write_table("table.txt", "Measured", text);
   write_rows(report, out.file("rows.csv"));
-  plot_chart(out.file("roofline.png"), roofline(report));
+  out.draw("roofline.png", roofline(report));
 }
 
 }  // namespace

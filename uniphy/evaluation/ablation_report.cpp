@@ -17,7 +17,7 @@ double value(const AblationRow& row, const std::string& name) {
 }
 
 void plot(const std::vector<AblationRow>& rows, const std::string& error, const std::string& title,
-          const std::string& y_label, const std::filesystem::path& png) {
+          const std::string& y_label, const std::string& png, const RunDirectory& out) {
   Chart chart;
   chart.title = title;
   chart.x_label = "cost of the law, ns a particle and step, one core";
@@ -33,7 +33,7 @@ void plot(const std::vector<AblationRow>& rows, const std::string& error, const 
     series.y.push_back(value(row, error));
     series.names.push_back(row.variant.name);
   }
-  plot_chart(png, chart);
+  out.draw(png, chart);
 }
 
 }  // namespace
@@ -90,9 +90,9 @@ std::string ablation_csv(const std::vector<AblationRow>& rows) {
 
 void plot_against_cost(const std::vector<AblationRow>& rows, const RunDirectory& out) {
   plot(rows, "rollout_error", "Roll-out error against cost",
-       "median of root of position mse / object size", out.file("rollout_against_cost.png"));
+       "median of root of position mse / object size", "rollout_against_cost.png", out);
   plot(rows, "stress_error", "Stress error against cost", "median of RMS error / RMS stress",
-       out.file("stress_against_cost.png"));
+       "stress_against_cost.png", out);
 }
 
 }  // namespace uniphy

@@ -156,7 +156,7 @@ void run(const AblationOptions& o, RunDirectory& out, Metrics& metrics) {
       metrics.set(variant.name + "." + name, value);
     }
     // After each, so that there is something to look at meanwhile.
-    write_text_file(out.file("ablation.md"), ablation_table(rows, materials));
+    out.write_table("ablation.md", "Variants", ablation_table(rows, materials));
     write_text_file(out.file("ablation.csv"), ablation_csv(rows));
   }
   std::fputs(ablation_table(rows, materials).c_str(), stdout);

@@ -24,7 +24,7 @@ void write_curve(const TrajectoryComparison& comparison, const std::filesystem::
   write_text_file(file, text);
 }
 
-void plot_curve(const TrajectoryComparison& comparison, const std::filesystem::path& file) {
+void plot_curve(const TrajectoryComparison& comparison, const RunDirectory& out) {
   Series series;
   for (std::size_t frame = 0; frame < comparison.time.size(); ++frame) {
     // A logarithmic axis has no place for the zeros of equal frames.
@@ -39,7 +39,7 @@ void plot_curve(const TrajectoryComparison& comparison, const std::filesystem::p
   chart.y_label = "root of the mean squared error / size of the object";
   chart.log_y = true;
   chart.series.push_back(series);
-  plot_chart(file, chart);
+  out.draw("curve.png", chart);
 }
 
 // With a word where it is only the beginning of a run.
@@ -62,9 +62,11 @@ RunFunction trajectory_stage(Section& config) {
                     "all: the times must be the same; common: those that both have");
   return [=](RunDirectory& out, Metrics& metrics) {
     const bool common = frames == "common";
-    const auto comparison = compare_trajectories(
-        read_compared(predicted, common), read_compared(reference, common),
-        common ? FrameMatch::common : FrameMatch::all, predicted.string(), reference.string());
+    const Trajectory judged = read_compared(predicted, common);
+    const Trajectory truth = read_compared(reference, common);
+    const auto comparison =
+        compare_trajectories(judged, truth, common ? FrameMatch::common : FrameMatch::all,
+                             predicted.string(), reference.string());
     metrics.set("position_mse", comparison.position_mse);
     metrics.set("root_mse", std::sqrt(comparison.position_mse));
     metrics.set("root_over_size", comparison.root_over_size);
@@ -76,7 +78,12 @@ RunFunction trajectory_stage(Section& config) {
       metrics.set(fmt::format("position_mse.{}", b), comparison.body_mse[b]);
     }
     write_curve(comparison, out.file("curve.csv"));
-    plot_curve(comparison, out.file("curve.png"));
+    plot_curve(comparison, out);
+    if (out.report()) {
+      out.report()->playbacks.push_back(
+          {"Comparison",
+           {motion_of("judged", judged, "reference", truth), motion_of("reference", truth)}});
+    }
     fmt::print("position_mse {:.6g} m^2, root/size {:.4g}\n", comparison.position_mse,
                comparison.root_over_size);
   };

@@ -20,8 +20,8 @@ std::string quoted(const std::string& text) {
 }
 
 void plot_values(const EvaluatedSet& set, const std::vector<double>& values,
-                 const std::string& title, const std::string& y_label,
-                 const std::filesystem::path& png) {
+                 const std::string& title, const std::string& y_label, const std::string& png,
+                 const RunDirectory& out) {
   std::map<std::string, std::vector<double>> of;
   std::vector<std::string> order;
   for (std::size_t i = 0; i < values.size(); ++i) {
@@ -50,7 +50,7 @@ void plot_values(const EvaluatedSet& set, const std::vector<double>& values,
     }
     chart.series.push_back(std::move(series));
   }
-  plot_chart(png, chart);
+  out.draw(png, chart);
 }
 
 }  // namespace
@@ -99,9 +99,9 @@ void plot_errors(const EvaluatedSet& set, const std::string& prefix, const RunDi
   const std::string failed =
       set.failed() == 0 ? "" : fmt::format(" ({} did not finish)", set.failed());
   plot_values(set, set.rollout_values(), "Roll-outs with the fitted code, " + set.name + failed,
-              "root of position mse / object size", out.file(prefix + "rollout_errors.png"));
+              "root of position mse / object size", prefix + "rollout_errors.png", out);
   plot_values(set, stress, "Stress of the fitted code, " + set.name, "RMS error / RMS stress",
-              out.file(prefix + "stress_errors.png"));
+              prefix + "stress_errors.png", out);
 }
 
 void plot_worst(const std::vector<EvaluatedSet>& sets, const RunDirectory& out) {
@@ -124,6 +124,11 @@ void plot_worst(const std::vector<EvaluatedSet>& sets, const RunDirectory& out) 
       fmt::format("The worst roll-out: {} {} of {}, {:.2g} % of its size", setup.record.material,
                   setup.record.shape, of->name, 100 * of->rollouts[worst].root_over_size);
   plot_particles(out.file("worst_rollout.png"), picture);
+  if (out.report()) {
+    out.report()->playbacks.push_back(
+        {picture.title,
+         {motion_of("analytic", truth), motion_of("learned", learned, "analytic", truth)}});
+  }
 }
 
 }  // namespace uniphy

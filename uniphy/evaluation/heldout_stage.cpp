@@ -152,7 +152,7 @@ void run(const HeldoutOptions& o, RunDirectory& out, Metrics& metrics) {
   watch.add_to("checks_s");
   write_text_file(out.file("errors.csv"), errors_csv(sets));
   const std::string table = markdown(sets, o, metrics);
-  write_text_file(out.file("errors.md"), table);
+  out.write_table("errors.md", "Errors", table);
   std::fputs(table.c_str(), stdout);
   plot_worst(sets, out);
 }

@@ -202,7 +202,7 @@ void run(const OpenWorldOptions& o, RunDirectory& out, Metrics& metrics) {
           FinishedFits::write(stem, cell.result, cell.seconds);
         }
         cells.push_back(cell);
-        write_text_file(out.file("open_world.md"), table(cells));
+        out.write_table("open_world.md", "Forecasts", table(cells));
         write_text_file(out.file("open_world.csv"), csv(cells));
       }
     }

@@ -219,7 +219,7 @@ void plot_outside(const std::vector<OutsideCell>& cells, const RunDirectory& out
     analytic.y.push_back(row.best_analytic);
   }
   chart.series = {learned, analytic};
-  plot_chart(out.file("forecast.png"), chart);
+  out.draw("forecast.png", chart);
 }
 
 }  // namespace uniphy

@@ -116,7 +116,7 @@ void run(const OutsideOptions& o, RunDirectory& out, Metrics& metrics) {
     }
     if (cells.empty()) continue;
     // After each, so that there is something to look at meanwhile.
-    write_text_file(out.file("outside.md"), outside_table(cells));
+    out.write_table("outside.md", "Forecasts", outside_table(cells));
     write_text_file(out.file("outside.csv"), outside_csv(cells));
   }
   if (cells.empty()) throw Error("none of the motions could be made: " + reason);

@@ -70,9 +70,9 @@ std::optional<CaseResult> read_case_result(const std::filesystem::path& folder,
   pictures.material = result.row.material;
   pictures.best = reader.read<double>("best", {-1});
   pictures.observed = observed_trajectory(read_observation(folder / "observation.h5"));
-  pictures.fitted = read_trajectory(folder / "fitted.h5", true);
-  pictures.predicted = read_trajectory(folder / "resimulated.h5", true);
-  pictures.truth = read_trajectory(folder / "other_truth.h5", true);
+  pictures.fitted = read_trajectory(folder / "fitted.h5");
+  pictures.predicted = read_trajectory(folder / "resimulated.h5");
+  pictures.truth = read_trajectory(folder / "other_truth.h5");
   return result;
 }
 

@@ -40,7 +40,8 @@ Observation observation_from(const TrajectorySetup& setup, const Trajectory& tru
 
 }  // namespace
 
-HiddenCase draw_hidden_case(const HiddenCaseOptions& options, std::int64_t material) {
+HiddenCase draw_hidden_case(const HiddenCaseOptions& options, std::int64_t material,
+                            FrameFields fields) {
   HiddenCase hidden;
   const std::int64_t first = material * options.draw.trajectories;
   std::string reason = "no draw was stable at the time step";
@@ -63,7 +64,7 @@ HiddenCase draw_hidden_case(const HiddenCaseOptions& options, std::int64_t mater
       hidden.other = draw(options, first + 1, a, &hidden.observed.law());
       if (hidden.other.record.shape == hidden.observed.record.shape) continue;
       try {
-        hidden.other_truth = run_scene(hidden.other.scene);
+        hidden.other_truth = run_scene(hidden.other.scene, fields);
         found = true;
       } catch (const Error& error) {
         reason = error.what();

@@ -27,7 +27,9 @@ struct HiddenCase {
 /// ranges, but for those (the stiffest sands) that the scene's fixed time step is too long for;
 /// draws where a simulation fails or no wall is met in the first half are replaced. Always the same
 /// for the same arguments. Throws Error when attempts are used up.
-HiddenCase draw_hidden_case(const HiddenCaseOptions& options, std::int64_t material);
+/// `fields` are those of other_truth.
+HiddenCase draw_hidden_case(const HiddenCaseOptions& options, std::int64_t material,
+                            FrameFields fields = {});
 
 /// What inference may see of the first scene.
 Observation observation_of(const HiddenCase& hidden);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <malloc.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -45,10 +46,11 @@ std::vector<double> best_so_far(const FitResult& fit) {
   return best;
 }
 
-Trajectory predict(const HiddenCase& hidden, const kernels::LawDescription& law) {
+Trajectory predict(const HiddenCase& hidden, const kernels::LawDescription& law,
+                   FrameFields fields) {
   SceneDescription scene = hidden.other.scene;
   scene.bodies.front().law = law;
-  return run_scene(scene);
+  return run_scene(scene, fields);
 }
 
 CaseResult identify_one(const IdentifyOptions& options, std::int64_t material,
@@ -63,7 +65,9 @@ CaseResult identify_one(const IdentifyOptions& options, std::int64_t material,
   const std::filesystem::path folder = out.file(row.material);
   make_directory(folder);
 
-  const HiddenCase hidden = draw_hidden_case(options.hidden, material);
+  // The report shows the plastic strain, which follows from F.
+  const FrameFields fields{false, false, out.report() != nullptr};
+  const HiddenCase hidden = draw_hidden_case(options.hidden, material, fields);
   row.shape = hidden.observed.record.shape;
   row.other_shape = hidden.other.record.shape;
   write_observation(folder / "observation.h5", observation_of(hidden));
@@ -72,7 +76,8 @@ CaseResult identify_one(const IdentifyOptions& options, std::int64_t material,
   const std::string name = (folder / "observation.h5").string();
   const Observation observation = read_observation(name);
   std::fprintf(stderr, "%s\n", row.material.c_str());
-  const Inference result = infer(observation, name, variables, options.fit, {});
+  Inference result = infer(observation, name, variables, options.fit, {});
+  if (fields.F) result.fitted.F = std::move(result.deformation);
   write_latent(folder / "latent.h5",
                latent_of(result, observation, variables, options.variables.model.string(),
                          out.config_yaml()));
@@ -100,7 +105,7 @@ CaseResult identify_one(const IdentifyOptions& options, std::int64_t material,
   pictured.best = best_so_far(result.fit);
   pictured.truth = hidden.other_truth;
   write_trajectory(folder / "other_truth.h5", hidden.other_truth);
-  pictured.predicted = predict(hidden, result.fit.law);
+  pictured.predicted = predict(hidden, result.fit.law, fields);
   write_trajectory(folder / "resimulated.h5", pictured.predicted);
   const TrajectoryComparison comparison =
       compare_trajectories(pictured.predicted, hidden.other_truth, FrameMatch::all,
@@ -142,6 +147,23 @@ void add_row(Metrics& metrics, const Identified& row) {
   set("memory_mb", row.memory_mb);
 }
 
+/// Observed beside fitted beside predicted, of every material.
+void show_motions(const std::vector<Identified>& rows, const std::vector<CasePictures>& all,
+                  const kernels::GridSettings& grid, Report& report) {
+  for (const CasePictures& p : all) {
+    const auto row = std::find_if(rows.begin(), rows.end(),
+                                  [&](const Identified& r) { return r.material == p.material; });
+    Playback playback;
+    playback.title = fmt::format("{}: {}, then {}", p.material, row->shape, row->other_shape);
+    playback.low = grid.bound * grid.dx();
+    playback.high = 1 - playback.low;
+    playback.motions = {
+        motion_of("observed", p.observed), motion_of("fitted", p.fitted, "observed", p.observed),
+        motion_of("predicted", p.predicted, "truth", p.truth), motion_of("truth", p.truth)};
+    report.playbacks.push_back(std::move(playback));
+  }
+}
+
 void draw_pictures(const std::vector<CasePictures>& all, RunDirectory& out) {
   Chart chart;
   chart.title = "Loss of the result's candidate; it rises where the horizon grows";
@@ -171,9 +193,10 @@ void draw_pictures(const std::vector<CasePictures>& all, RunDirectory& out) {
       }
     }
   }
-  plot_chart(out.file("loss.png"), chart);
+  out.draw("loss.png", chart);
   ParticlePicture picture;
   picture.columns = 8;
+  picture.colour_label = kHeightInBody;
   picture.panel_pixels = 290;
   picture.low = 0.13;  // the walls stand at 0.15
   picture.high = 0.87;
@@ -222,9 +245,10 @@ void identify(const IdentifyOptions& options, RunDirectory& out, Metrics& metric
     rows.push_back(row);
   }
   const std::string table = identify_table(rows);
-  write_text_file(out.file("table.md"), table);
+  out.write_table("table.md", "What was identified", table);
   std::fputs(table.c_str(), stdout);
   if (!pictures.empty()) draw_pictures(pictures, out);
+  if (out.report()) show_motions(rows, pictures, options.hidden.draw.grid, *out.report());
   if (!failures.empty()) {
     metrics.write(out.file("metrics.json"));
     throw Error(failures.substr(2));

@@ -43,13 +43,11 @@ void add_material(Metrics& metrics, const MaterialBelief& belief) {
   }
 }
 
-/// Of the law found and of those drawn from the posterior, by what the roll-out strained it.
+/// Of the law found and of those drawn from the posterior, probed up to a strain.
 MaterialBelief read_inference(const Inference& inference, const Adaptation& adapted,
-                              const FitVariables& variables, const MotionObjective& objective) {
+                              const FitVariables& variables, double strain) {
   const FitResult& fit = inference.fit;
   const double dt = inference.seen.dt;
-  const double strain =
-      strain_seen(objective.deformations(fit.law, fit.motion, inference.seen.frames));
   std::vector<MaterialReading> samples(adapted.samples.size());
   kernels::for_each(static_cast<std::ptrdiff_t>(samples.size()), [&](std::ptrdiff_t i) {
     samples[i] = read_material(adapted.samples[i], dt, strain);
@@ -111,7 +109,9 @@ Inference infer(const Observation& observation, const std::string& name,
   const FitPosterior& posterior = result.posterior;
   if (!posterior.spread.empty() && posterior.determined == 0) result.fit.determined = false;
   if (result.fit.determined) {
-    result.material = read_inference(result, adapted, variables, *objective);
+    std::vector<double> F = objective->deformations(result.fit.law, result.fit.motion, seen.frames);
+    result.material = read_inference(result, adapted, variables, strain_seen(F));
+    if (!seen.tracked()) result.deformation = std::move(F);
   }
   return result;
 }
@@ -270,25 +270,39 @@ ParticlePicture frames_picture(const std::vector<std::pair<std::string, const Tr
                                int columns) {
   ParticlePicture picture;
   picture.columns = columns;
+  picture.colour_label = kHeightInBody;
   for (const auto& [name, trajectory] : rows) {
+    // The last row has all that may be hidden in the others.
+    const Trajectory& whole =
+        rows.back().second->particles == trajectory->particles ? *rows.back().second : *trajectory;
+    const std::vector<double> heights =
+        heights_in_body({whole.positions(0), whole.positions(0) + 3 * whole.particles});
     for (int c = 0; c < columns; ++c) {
       const std::int64_t frame = (trajectory->frames - 1) * c / std::max(1, columns - 1);
       ParticlePanel panel;
       panel.caption = fmt::format("{} {:.0f} ms", name, 1e3 * trajectory->time[frame]);
-      // Colour follows the particles: height at the first frame, of the last row where it is
-      // hidden.
-      const Trajectory& whole = *rows.back().second;
       for (std::int64_t p = 0; p < trajectory->particles; ++p) {
         const double* x = trajectory->positions(frame) + 3 * p;
-        const double height = trajectory->positions(0)[3 * p + 1];
         if (std::isnan(x[0])) continue;
         panel.x.insert(panel.x.end(), x, x + 3);
-        panel.colour.push_back(std::isnan(height) ? whole.positions(0)[3 * p + 1] : height);
+        panel.colour.push_back(heights[p]);
       }
       picture.panels.push_back(std::move(panel));
     }
   }
   return picture;
+}
+
+Playback fit_playback(const Inference& inference, const std::string& title) {
+  const Trajectory seen = observed_trajectory(inference.seen);
+  Trajectory fitted = inference.fitted;
+  fitted.F = inference.deformation;
+  const double wall = inference.seen.bound / double(inference.seen.grid);
+  return {title,
+          {motion_of("observed", seen), motion_of("fitted", fitted, "observed", seen)},
+          {},
+          wall,
+          1 - wall};
 }
 
 std::string fit_fingerprint(const Observation& observation, const FitVariables& variables,

@@ -13,14 +13,18 @@
 #include "uniphy/io/trajectory.hpp"
 #include "uniphy/report/metrics.hpp"
 #include "uniphy/report/plot.hpp"
+#include "uniphy/report/report.hpp"
 
 namespace uniphy {
 
 /// A finished inference and the roll-out of its result.
 struct Inference {
   FitResult fit;
-  Observation seen;               ///< with the starts of its points as fitted, see Adaptation
-  Trajectory fitted;              ///< the points at the observed frames
+  Observation seen;   ///< with the starts of its points as fitted, see Adaptation
+  Trajectory fitted;  ///< the points at the observed frames
+  /// [frames, particles, 3, 3], the deformation gradients of `fitted`; empty where the material is
+  /// not determined or the points are no particles.
+  std::vector<double> deformation;
   double fit_mse = 0;             ///< m², of `fitted` against the observation
   double size = 0;                ///< m, largest side of the observed body
   double best_start = 0;          ///< m², what the best start reaches over all frames
@@ -80,6 +84,9 @@ Chart loss_chart(const FitResult& fit, const FitVariables& variables, const std:
 /// `columns` frames of several trajectories of the same number of frames, one row each.
 ParticlePicture frames_picture(const std::vector<std::pair<std::string, const Trajectory*>>& rows,
                                int columns);
+
+/// Observed and fitted side by side, for a report.
+Playback fit_playback(const Inference& inference, const std::string& title);
 
 /// A trajectory of the points that holds what was observed, NaN where hidden; each has an equal
 /// part of the body where it is no particle.

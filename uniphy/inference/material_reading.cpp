@@ -83,6 +83,20 @@ class Probe {
   double dt_;
 };
 
+/// Of small strains under a compression; without one they are what two of them lead to in a line.
+struct Moduli {
+  double bulk, mu;  ///< Pa
+  double left;      ///< of a shear of 2 kSmall
+};
+Moduli moduli(const Probe& probe, double compression) {
+  const auto pressure = [&](double h) { return -probe.at(Vector3d::Constant(-h)).tau.trace() / 3; };
+  const Vector3d shear(kSmall, -kSmall, 0);
+  const Probe::Answer sheared = probe.at(Vector3d::Constant(-compression) + shear);
+  return {(pressure(compression + kSmall) - pressure(compression - kSmall)) / (6 * kSmall),
+          (sheared.tau(0, 0) - sheared.tau(1, 1)) / (4 * kSmall),
+          sheared.strain[0] - sheared.strain[1]};
+}
+
 void read_fluid(const Probe& probe, double bulk, MaterialReading& m) {
   m.material = "newtonian";
   m.lambda = bulk;
@@ -129,17 +143,13 @@ MaterialReading read_material(const kernels::LawDescription& law, double dt, dou
   MaterialReading m;
   m.strain_seen = std::clamp(strain, 1e-6, 2.0);
   const Probe probe(law, dt);
-  const auto pressure = [&](double h) { return -probe.at(Vector3d::Constant(-h)).tau.trace() / 3; };
-  const double bulk =
-      (pressure(kCompression + kSmall) - pressure(kCompression - kSmall)) / (6 * kSmall);
-  const Vector3d base = Vector3d::Constant(-kCompression), h(kSmall, -kSmall, 0);
-  const Probe::Answer sheared = probe.at(base + h);
-  const double left = sheared.strain[0] - sheared.strain[1];
-  if (left < kSmall) {  // of 2 kSmall
+  const Moduli at = moduli(probe, kCompression), twice = moduli(probe, 2 * kCompression);
+  const double bulk = 2 * at.bulk - twice.bulk;
+  if (at.left < kSmall) {  // of 2 kSmall
     read_fluid(probe, bulk, m);
     return m;
   }
-  m.mu = (sheared.tau(0, 0) - sheared.tau(1, 1)) / (4 * kSmall);
+  m.mu = 2 * at.mu - twice.mu;
   m.lambda = bulk - 2 * m.mu / 3;
   m.young = 9 * bulk * m.mu / (3 * bulk + m.mu);
   m.poisson = (3 * bulk - 2 * m.mu) / (2 * (3 * bulk + m.mu));

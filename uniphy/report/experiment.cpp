@@ -17,6 +17,7 @@
 #include "ops/kernels/base/error.hpp"
 #include "uniphy/io/atomic_file.hpp"
 #include "uniphy/report/interrupt.hpp"
+#include "uniphy/report/report_writer.hpp"
 
 namespace uniphy {
 namespace {
@@ -28,6 +29,7 @@ struct CommandLine {
   std::vector<std::string> overrides;
   std::string out;
   int threads = 0;
+  bool report = false;
   bool help = false;
 };
 
@@ -49,20 +51,26 @@ std::string help_text(const ExperimentInfo& info, const DeclareFunction& declare
   Section root = config.root();
   declare(root);
   std::string text = fmt::format(
-      "{}: {}\n\nUsage: {} CONFIG.yaml [--set key.path=value]... [--out DIR] [--threads N]\n",
+      "{}: {}\n\nUsage: {} CONFIG.yaml [--set key.path=value]... [--out DIR] [--threads N] "
+      "[--report]\n",
       info.name, info.summary, info.name);
   add_lines(text, "Reads", info.reads);
   std::vector<std::string> writes = info.writes;
   writes.push_back("DIR/config.yaml     the configuration with every default filled in");
   writes.push_back("DIR/metrics.json    name -> number, with wall_s and peak_memory_mb");
+  writes.push_back(
+      "DIR/report.html     with --report: tables, charts, motions, all of it to look at");
   add_lines(text, "Writes", writes);
-  add_lines(text, "Options",
-            {"--set KEY=VALUE  sets a key over the file, value in YAML (bodies.0.density=500);",
-             "                 KEY= takes it back to its default",
-             fmt::format("--out DIR        output directory, default {}",
-                         default_directory(info, "CONFIG")),
-             "--threads N      threads, default what OpenMP takes (OMP_NUM_THREADS)",
-             "--help           this text"});
+  add_lines(
+      text, "Options",
+      {"--set KEY=VALUE  sets a key over the file, value in YAML (bodies.0.density=500);",
+       "                 KEY= takes it back to its default",
+       fmt::format("--out DIR        output directory, default {}",
+                   default_directory(info, "CONFIG")),
+       "--threads N      threads, default what OpenMP takes (OMP_NUM_THREADS)",
+       "--report         also writes report.html, one file that opens in a browser; needs",
+       fmt::format("                 libjs-three, or {} set to three.min.js;", kThreeJsVariable),
+       "                 --no-report takes it back", "--help           this text"});
   add_lines(text, "Examples", info.examples);
   return text + "\nKeys of CONFIG.yaml:\n" + config.table();
 }
@@ -76,6 +84,7 @@ CommandLine parse_command_line(int argc, const char* const* argv, const Experime
   app.add_option("CONFIG", line.config);
   app.add_option("--set", line.overrides)->type_size(1)->allow_extra_args(false);
   app.add_option("--out", line.out);
+  app.add_flag("--report,!--no-report", line.report);
   const auto* threads = app.add_option("--threads", line.threads);
   try {
     app.parse(argc, argv);
@@ -104,7 +113,7 @@ class Undo {
          !std::filesystem::exists(d, ignored_) && d.has_relative_path(); d = d.parent_path()) {
       made_.push_back(d);
     }
-    for (const char* name : {kConfig, kMetrics}) {
+    for (const char* name : {kConfig, kMetrics, kReport}) {
       if (std::filesystem::is_regular_file(directory_ / name, ignored_))
         kept_.emplace_back(name, read_text_file(directory_ / name));
     }
@@ -121,6 +130,7 @@ class Undo {
 
   static constexpr const char* kConfig = "config.yaml";
   static constexpr const char* kMetrics = "metrics.json";
+  static constexpr const char* kReport = "report.html";
 
  private:
   using Entry = std::tuple<std::filesystem::path, std::filesystem::file_time_type, std::uintmax_t>;
@@ -170,18 +180,20 @@ int run(const CommandLine& line, const ExperimentInfo& info, const DeclareFuncti
   Section root = config.root();
   const RunFunction work = declare(root);
   config.finish();
+  ReportWriter report(line.report, info.name, info.summary, line.config);
 
   if (line.threads > 0) omp_set_num_threads(line.threads);
   Undo undo(line.out);
   make_directory(line.out);
   const DirectoryLock lock(line.out);
   const std::string resolved = config.resolved();
-  RunDirectory out(line.out, resolved, omp_get_max_threads());
+  RunDirectory out(line.out, resolved, omp_get_max_threads(), report.report());
   write_text_file(out.file(Undo::kConfig),
                   fmt::format("# {} {}\n{}", info.name, line.config, resolved));
   // Numbers of an earlier run would pass for those of this one if it fails.
   std::error_code ignored;
   std::filesystem::remove(out.file(Undo::kMetrics), ignored);
+  std::filesystem::remove(out.file(Undo::kReport), ignored);
   undo.begin();
 
   catch_interrupts();
@@ -189,6 +201,7 @@ int run(const CommandLine& line, const ExperimentInfo& info, const DeclareFuncti
   try {
     work(out, metrics);
   } catch (...) {
+    report.write_failed(out.file(Undo::kReport), resolved, metrics);
     try {
       undo.run();
     } catch (const Error&) {  // what ended the run is what the user has to hear of
@@ -197,13 +210,29 @@ int run(const CommandLine& line, const ExperimentInfo& info, const DeclareFuncti
   }
   metrics.add_resources(start);
   metrics.write(out.file(Undo::kMetrics));
+  report.write(out.file(Undo::kReport), resolved, metrics);
   return out.no_answer() ? kNoAnswer : 0;
 }
 
 }  // namespace
 
-RunDirectory::RunDirectory(std::filesystem::path root, std::string config_yaml, int threads)
-    : root_(std::move(root)), config_yaml_(std::move(config_yaml)), threads_(threads) {}
+RunDirectory::RunDirectory(std::filesystem::path root, std::string config_yaml, int threads,
+                           std::shared_ptr<Report> report)
+    : root_(std::move(root)),
+      config_yaml_(std::move(config_yaml)),
+      threads_(threads),
+      report_(std::move(report)) {}
+
+void RunDirectory::draw(const std::string& name, const Chart& chart) const {
+  plot_chart(file(name), chart);
+  if (report_) report_->charts.push_back(chart);
+}
+
+void RunDirectory::write_table(const std::string& name, const std::string& title,
+                               const std::string& text) const {
+  write_text_file(file(name), text);
+  if (report_) report_->set_table(title, text);
+}
 
 int run_experiment(int argc, const char* const* argv, const ExperimentInfo& info,
                    const DeclareFunction& declare) {

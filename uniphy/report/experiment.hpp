@@ -2,7 +2,7 @@
 
 // The frame of every binary:
 //
-//   NAME CONFIG.yaml [--set key.path=value]... [--out DIR] [--threads N] [--help]
+//   NAME CONFIG.yaml [--set key.path=value]... [--out DIR] [--threads N] [--report] [--help]
 //
 //   int main(int argc, char** argv) {
 //     return uniphy::run_experiment(argc, argv, {"uniphy_simulate", "Simulates ...", ...},
@@ -15,16 +15,20 @@
 //   }
 //
 // DIR receives config.yaml (resolved: every default filled in) before the work starts, the
-// products, and metrics.json (with wall_s and peak_memory_mb) when it ends well. A run that fails
-// before it has written anything leaves DIR as it found it. A DIR belongs to one run at a time.
+// products, and metrics.json (with wall_s and peak_memory_mb) when it ends well; with --report also
+// report.html (report.hpp), of a run that fails, too, where it has something to show. A run that
+// fails before it has written anything leaves DIR as it found it. A DIR belongs to one run at a
+// time.
 
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "uniphy/config/config.hpp"
 #include "uniphy/report/metrics.hpp"
+#include "uniphy/report/report.hpp"
 
 namespace uniphy {
 
@@ -39,7 +43,9 @@ struct ExperimentInfo {
 /// The output directory of one run.
 class RunDirectory {
  public:
-  RunDirectory(std::filesystem::path root, std::string config_yaml, int threads);
+  /// `report`: what --report shows, or null.
+  RunDirectory(std::filesystem::path root, std::string config_yaml, int threads,
+               std::shared_ptr<Report> report = nullptr);
   const std::filesystem::path& root() const { return root_; }
   /// The path of a product.
   std::filesystem::path file(const std::string& name) const { return root_ / name; }
@@ -52,11 +58,21 @@ class RunDirectory {
   void set_no_answer() { no_answer_ = true; }
   bool no_answer() const { return no_answer_; }
 
+  /// Draws a chart as a PNG (plot_chart), and into the report where there is one.
+  void draw(const std::string& name, const Chart& chart) const;
+  /// Writes a table in Markdown (or a text), and shows it in the report where there is one, in
+  /// place of one of the same title.
+  void write_table(const std::string& name, const std::string& title,
+                   const std::string& text) const;
+  /// What --report shows; null without it, so that nothing is made for it in vain.
+  Report* report() const { return report_.get(); }
+
  private:
   std::filesystem::path root_;
   std::string config_yaml_;
   int threads_;
   bool no_answer_ = false;
+  std::shared_ptr<Report> report_;
 };
 inline constexpr int kNoAnswer = 3;
 

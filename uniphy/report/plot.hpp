@@ -16,7 +16,7 @@ struct Series {
   std::vector<double> y;           ///< same length as x; points that are not finite leave a gap
   std::vector<double> colour;      ///< empty, or a value a point, shown by the colour scale
   bool points = false;             ///< markers instead of a line
-  std::vector<std::string> names;  ///< empty, or a text beside every point
+  std::vector<std::string> names;  ///< empty, or a text beside every point, where there is room
 };
 
 struct Chart {
@@ -41,17 +41,24 @@ struct ParticlePanel {
   std::vector<double> colour;  ///< [particles] any value; empty: by distance to the camera
 };
 
-/// Panels on a grid of `columns`, read row by row, all seen by the same orthographic camera.
+/// Panels on a grid of `columns`, read row by row, each with its caption under it, all seen by the
+/// same orthographic camera and coloured by the same scale; what is far is darker.
 struct ParticlePicture {
   std::string title;
   std::vector<ParticlePanel> panels;
-  int columns = 0;        ///< 0: one row
-  double azimuth = 35;    ///< degrees, camera turned about the y axis
-  double elevation = 20;  ///< degrees above the horizon
+  std::string colour_label;  ///< of the colour bar; empty: there is none
+  int columns = 0;           ///< 0: one row
+  double azimuth = 35;       ///< degrees, camera turned about the y axis
+  double elevation = 20;     ///< degrees above the horizon
   int panel_pixels = 260;
   double low = 0;  ///< the cube that is drawn, [low, high]^3 m
   double high = 1;
 };
+
+/// A colour that follows the particles: the height of each [particles, 3] from 0 of the lowest to 1
+/// of the highest, NaN of what is not there.
+std::vector<double> heights_in_body(const std::vector<double>& x);
+inline constexpr const char* kHeightInBody = "height within the body in the first frame";
 
 bool plot_particles(const std::filesystem::path& png, const ParticlePicture& picture);
 

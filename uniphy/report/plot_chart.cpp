@@ -6,6 +6,7 @@
 #include "ops/kernels/base/error.hpp"
 #include "uniphy/report/gnuplot.hpp"
 #include "uniphy/report/plot.hpp"
+#include "uniphy/report/plot_labels.hpp"
 
 namespace uniphy {
 namespace {
@@ -43,9 +44,8 @@ bool plot_chart(const std::filesystem::path& png, const Chart& chart) {
                         (series.colour.empty() || std::isfinite(series.colour[k]));
       any = any || good;
       // An empty line ends one stroke and begins the next.
-      block += good ? fmt::format("{} {} {} {}\n", series.x[k], series.y[k],
-                                  series.colour.empty() ? 0.0 : series.colour[k],
-                                  series.names.empty() ? "" : gnuplot_text(series.names[k]))
+      block += good ? fmt::format("{} {} {}\n", series.x[k], series.y[k],
+                                  series.colour.empty() ? 0.0 : series.colour[k])
                     : "\n";
     }
     if (!any) continue;
@@ -67,12 +67,6 @@ bool plot_chart(const std::filesystem::path& png, const Chart& chart) {
                           series.points ? (again ? 6 : 7) : (again ? 2 : 1), colour);
     }
     plot += fmt::format("{} $s{} {} {}", plot.empty() ? "plot" : ", \\\n    ", i, style, title);
-    if (!series.names.empty()) {
-      plot += fmt::format(
-          ", \\\n    $s{} using 1:2:4 with labels noenhanced left offset 0.7,0.4 "
-          "font ',9' notitle",
-          i);
-    }
   }
   if (plot.empty()) {
     std::fprintf(stderr, "warning: %s: not drawn, no point can be drawn\n", png.c_str());
@@ -91,6 +85,7 @@ bool plot_chart(const std::filesystem::path& png, const Chart& chart) {
   // Points may lie anywhere; a line that passes under the legend shows on both sides of it.
   // Without room on the right the last label of the axis is cut.
   script += scattered ? "set key outside right top\n" : "set key opaque\nset rmargin 6\n";
+  script += label_commands(chart);
   if (chart.log_x) script += "set logscale x\nset format x '10^{%T}'\n";
   if (chart.log_y) script += "set logscale y\nset format y '10^{%T}'\n";
   if (coloured) {

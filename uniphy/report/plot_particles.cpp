@@ -13,6 +13,7 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr int kCaptionPixels = 24;
+constexpr int kBarPixels = 40;  // of the colour bar with its numbers
 constexpr int kTitlePixels = 34;
 // Diameter in pixels of gnuplot's point type 7 at size 1, both terminals.
 constexpr double kPointPixels = 6;
@@ -65,9 +66,23 @@ double spacing(const std::vector<double>& x) {
   return std::cbrt(volume / std::max<double>(1, static_cast<double>(x.size()) / 3));
 }
 
+/// The least and the largest colour of all panels, which have one scale.
+std::pair<double, double> colour_range(const ParticlePicture& picture) {
+  double low = 1e300, high = -1e300;
+  for (const ParticlePanel& panel : picture.panels) {
+    for (const double value : panel.colour) {
+      if (!std::isfinite(value)) continue;
+      low = std::min(low, value);
+      high = std::max(high, value);
+    }
+  }
+  return {low, high};
+}
+
 /// Lines "x y size colour" of a panel, far particles first; each is a dark disc under a bright one.
 std::string particle_lines(const ParticlePicture& picture, const ParticlePanel& panel,
-                           const Bounds& bounds, double shift_x, double shift_y, double scale) {
+                           const Bounds& bounds, std::pair<double, double> range, double shift_x,
+                           double shift_y, double scale) {
   const std::size_t count = panel.x.size() / 3;
   std::vector<Projected> points;
   for (std::size_t i = 0; i < count; ++i) {
@@ -77,12 +92,7 @@ std::string particle_lines(const ParticlePicture& picture, const ParticlePanel& 
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return points[a].z < points[b].z; });
-  double low = 0, high = 1;
-  if (!panel.colour.empty()) {
-    const auto [least, largest] = std::minmax_element(panel.colour.begin(), panel.colour.end());
-    low = *least;
-    high = *largest;
-  }
+  const auto [low, high] = range;
   const double pixels = std::clamp(1.25 * spacing(panel.x) * scale, 2.0, 16.0);
   std::string lines;
   for (const std::size_t i : order) {
@@ -92,7 +102,7 @@ std::string particle_lines(const ParticlePicture& picture, const ParticlePanel& 
         std::clamp((p.z - bounds.low_z) / (bounds.high_z - bounds.low_z), 0.0, 1.0);
     const double value =
         panel.colour.empty() ? depth : (high > low ? (panel.colour[i] - low) / (high - low) : 0.5);
-    const unsigned bright = shaded(viridis(value), 0.65 + 0.35 * depth);
+    const unsigned bright = shaded(viridis(value), 0.5 + 0.5 * depth);
     const double x = p.x + shift_x, y = p.y + shift_y;
     lines +=
         fmt::format("{:.5f} {:.5f} {:.3f} {}\n", x, y, pixels / kPointPixels, shaded(bright, 0.45));
@@ -125,6 +135,29 @@ std::string floor_polygon(const ParticlePicture& picture, double shift_x, double
   return text + " fillstyle solid noborder fillcolor rgb '#f0f0f0' behind\n";
 }
 
+/// A bar of colours with the numbers at its ends, around (x, y), `width` m wide.
+std::string colour_bar(const ParticlePicture& picture, double x, double y, double width,
+                       double scale) {
+  constexpr int kSteps = 64;
+  const double half = 5 / scale;
+  std::string script;
+  for (int k = 0; k < kSteps; ++k) {
+    const double from = x + width * (double(k) / kSteps - 0.5);
+    script += fmt::format(
+        "set object rectangle from {:.5f},{:.5f} to {:.5f},{:.5f} fillstyle solid noborder "
+        "fillcolor rgb '#{:06x}' front\n",
+        from, y - half, std::min(from + 2 * width / kSteps, x + 0.5 * width), y + half,
+        viridis((k + 0.5) / kSteps));
+  }
+  const auto [low, high] = colour_range(picture);
+  const double gap = 0.5 * width + 6 / scale;
+  script +=
+      fmt::format("set label {} at {:.5f},{:.5f} right noenhanced\n",
+                  gnuplot_text(fmt::format("{}  {:.3g}", picture.colour_label, low)), x - gap, y);
+  return script +
+         fmt::format("set label \"{:.3g}\" at {:.5f},{:.5f} left noenhanced\n", high, x + gap, y);
+}
+
 }  // namespace
 
 Projected project_point(const ParticlePicture& picture, const double* point) {
@@ -135,6 +168,20 @@ Projected project_point(const ParticlePicture& picture, const double* point) {
   const double towards = std::sin(a) * x + std::cos(a) * z;  // horizontal, towards the camera
   return {std::cos(a) * x - std::sin(a) * z, std::cos(e) * y - std::sin(e) * towards,
           std::sin(e) * y + std::cos(e) * towards};
+}
+
+std::vector<double> heights_in_body(const std::vector<double>& x) {
+  double low = 1e300, high = -1e300;
+  for (std::size_t i = 1; i < x.size(); i += 3) {
+    if (!std::isfinite(x[i])) continue;
+    low = std::min(low, x[i]);
+    high = std::max(high, x[i]);
+  }
+  std::vector<double> heights;
+  for (std::size_t i = 1; i < x.size(); i += 3) {
+    heights.push_back(high > low || !std::isfinite(x[i]) ? (x[i] - low) / (high - low) : 0.5);
+  }
+  return heights;
 }
 
 bool plot_particles(const std::filesystem::path& png, const ParticlePicture& picture) {
@@ -160,6 +207,7 @@ bool plot_particles(const std::filesystem::path& png, const ParticlePicture& pic
 
   std::string script = "unset border\nunset tics\nunset key\nset size ratio -1\n";
   std::string cubes, points;
+  const auto range = colour_range(picture);
   for (int i = 0; i < count; ++i) {
     const double shift_x = (i % columns) * step_x;
     const double shift_y = -(i / columns) * step_y;
@@ -168,25 +216,35 @@ bool plot_particles(const std::filesystem::path& png, const ParticlePicture& pic
     script +=
         fmt::format("set label {} at {:.5f},{:.5f} center noenhanced\n",
                     gnuplot_text(panel.caption), shift_x + 0.5 * (bounds.low_x + bounds.high_x),
-                    shift_y + bounds.high_y + 0.03 * height + 0.5 * kCaptionPixels / scale);
+                    shift_y + bounds.low_y - 0.03 * height - 0.5 * kCaptionPixels / scale);
     cubes += cube_lines(picture, shift_x, shift_y);
-    points += particle_lines(picture, panel, bounds, shift_x, shift_y, scale);
+    points += particle_lines(picture, panel, bounds, range, shift_x, shift_y, scale);
   }
   const int title_pixels = picture.title.empty() ? 0 : kTitlePixels;
+  const int bar_pixels =
+      picture.colour_label.empty() || range.first > range.second ? 0 : kBarPixels;
   const int pixel_width = static_cast<int>(std::lround(columns * step_x * scale));
-  const int pixel_height = static_cast<int>(std::lround(rows * step_y * scale)) + title_pixels;
+  const int pixel_height =
+      static_cast<int>(std::lround(rows * step_y * scale)) + title_pixels + bar_pixels;
   if (!picture.title.empty()) {
     script += fmt::format(
         "set label {} at screen 0.5, screen {:.5f} center noenhanced font ',14'\n",
         gnuplot_text(picture.title), 1 - 0.5 * title_pixels / static_cast<double>(pixel_height));
   }
   const double low_x = bounds.low_x - 0.03 * width;
-  const double low_y = bounds.low_y - 0.03 * height - (rows - 1) * step_y;
+  const double end_y = bounds.low_y - 0.03 * height - kCaptionPixels / scale - (rows - 1) * step_y;
+  const double low_y = end_y - bar_pixels / scale;
+  if (bar_pixels > 0) {
+    const double x = low_x + 0.5 * columns * step_x;
+    // At the right of the label where the picture is narrow.
+    script += colour_bar(picture, x + std::min(0.2 * width, 0.2 * columns * step_x),
+                         0.5 * (low_y + end_y), 0.7 * width, scale);
+  }
   script += fmt::format(
       "set lmargin at screen 0\nset rmargin at screen 1\nset bmargin at screen 0\n"
       "set tmargin at screen {:.6f}\nset xrange [{:.6f}:{:.6f}]\nset yrange [{:.6f}:{:.6f}]\n",
       1 - title_pixels / static_cast<double>(pixel_height), low_x, low_x + columns * step_x, low_y,
-      low_y + rows * step_y);
+      low_y + rows * step_y + bar_pixels / scale);
   std::string plot = "plot $cubes using 1:2 with lines lw 1 lc rgb '#bbbbbb'";
   if (!points.empty()) {
     plot += ", $points using 1:2:3:4 with points pt 7 ps variable lc rgb variable";

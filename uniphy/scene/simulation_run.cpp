@@ -71,17 +71,58 @@ void draw_frames(const std::filesystem::path& png, const std::filesystem::path& 
   const auto body = reader.read<std::int32_t>("body", {shape[1]});
   ParticlePicture picture;
   picture.columns = static_cast<int>(std::min<std::int64_t>(output.picture_frames, 6));
+  // Several bodies are told apart; of one, colours follow the particles.
+  const bool several = body.back() > 0;
+  std::vector<double> colour(body.begin(), body.end());
+  if (!several) {
+    const auto first = reader.read_rows<double>("x", {-1, shape[1], 3}, 0, 1);
+    colour = heights_in_body(first);
+    picture.colour_label = kHeightInBody;
+  }
   if (!trajectory_failure(reader).empty()) picture.title = "incomplete";
   for (std::int64_t frame = 0; frame < shape[0]; ++frame) {
     if (!is_pictured(frame, shape[0], output.picture_frames)) continue;
     ParticlePanel panel;
     panel.caption = fmt::format("{:.3f} s", time[static_cast<std::size_t>(frame)]);
     panel.x = reader.read_rows<double>("x", {-1, shape[1], 3}, frame, 1);
-    if (body.back() > 0) panel.colour.assign(body.begin(), body.end());
+    panel.colour = colour;
     picture.panels.push_back(std::move(panel));
   }
   plot_particles(png, picture);
 }
+
+/// Takes the motion for the report, where there is one.
+class ReportedMotion {
+ public:
+  ReportedMotion(const SceneDescription& scene, const PlacedScene& placed, const RunDirectory& out)
+      : report_(out.report()) {
+    if (report_ == nullptr) return;
+    recorder_.emplace("simulated", placed.body);
+    playback_.title = "Simulation";
+    for (const BodyDescription& body : scene.bodies) playback_.bodies.push_back(body.name);
+    playback_.low = placed.grid.bound * placed.grid.dx();
+    playback_.high = 1 - playback_.low;
+  }
+  /// The fields of a frame, with what the report needs.
+  FrameFields fields(FrameFields fields) const {
+    fields.F = fields.F || report_ != nullptr;
+    return fields;
+  }
+  void add(double time, const ParticleState& state) {
+    if (recorder_) recorder_->add(time, state.x.data(), state.F.data(), nullptr);
+  }
+  /// The frames that there are: all of them, or those before a failure.
+  void show() {
+    if (!recorder_) return;
+    playback_.motions.push_back(recorder_->finish());
+    report_->playbacks.push_back(std::move(playback_));
+  }
+
+ private:
+  Report* report_;
+  std::optional<MotionRecorder> recorder_;
+  Playback playback_;
+};
 
 /// What a run that failed has computed is all that shows why. Throws nothing: the failure itself is
 /// what the user has to hear of last.
@@ -148,6 +189,7 @@ void simulate_into(const SceneDescription& scene, const SimulationOutput& output
 
   Observation seen = begin_observation(placed.grid, scene.bodies.front().density, placed.volume);
   const std::int64_t first = placed.start ? placed.start->point.step : 0;
+  ReportedMotion reported(scene, placed, out);
   Progress progress("simulate", placed.steps);
   const auto start = std::chrono::steady_clock::now();
   ParticleState last;
@@ -155,18 +197,20 @@ void simulate_into(const SceneDescription& scene, const SimulationOutput& output
   bool storing = false;  // what fails while a frame is written may leave a part of it
   try {
     last = run_scene(
-        scene, placed, output.fields,
+        scene, placed, reported.fields(output.fields),
         [&](double time, std::int64_t step, const ParticleState& state) {
           storing = true;
           writer.append(time, step, state);
           storing = false;
           if (output.observation) add_frame(seen, time, state.x);
+          reported.add(time, state);
           progress.update(step - first);
           return true;
         },
         &end);
   } catch (const std::exception& error) {
     progress.finish();
+    reported.show();
     if (!storing && writer.frames() > 0) keep_frames(writer, error.what(), output, out);
     throw;
   }
@@ -180,6 +224,7 @@ void simulate_into(const SceneDescription& scene, const SimulationOutput& output
       static_cast<double>(placed.particles()) * static_cast<double>(placed.steps);
   if (particle_steps > 0) metrics.set("ns_per_particle_step", 1e9 * seconds / particle_steps);
   draw_frames(out.file("frames.png"), out.file("trajectory.h5"), output);
+  reported.show();
 }
 
 }  // namespace uniphy

@@ -42,7 +42,7 @@ void write_training_curves(const RunDirectory& out, const std::vector<TrainingPo
   chart.y_label = "relative error";
   chart.log_y = true;
   chart.series = curves;
-  plot_chart(out.file("training.png"), chart);
+  out.draw("training.png", chart);
 }
 
 void plot_latents(const RunDirectory& out, const models::LatentCodes& codes) {
@@ -77,8 +77,8 @@ void plot_latents(const RunDirectory& out, const models::LatentCodes& codes) {
     all.colour.push_back(
         std::log10(codes->material_parameters()[i][0]));  // not finite where there is none
   }
-  plot_chart(out.file("latents.png"), by_material);
-  plot_chart(out.file("latents_mu.png"), by_mu);
+  out.draw("latents.png", by_material);
+  out.draw("latents_mu.png", by_mu);
 }
 
 }  // namespace uniphy

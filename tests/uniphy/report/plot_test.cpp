@@ -3,11 +3,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 
 #include "tests/uniphy/support/scratch.hpp"
 #include "uniphy/io/atomic_file.hpp"
+#include "uniphy/report/plot_labels.hpp"
 
 namespace uniphy {
 namespace {
@@ -76,6 +78,47 @@ TEST(Plot, PointsMayHaveNamesAndColours) {
   EXPECT_TRUE(plot_chart(scratch.file("c.png"), chart));
   EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
   EXPECT_EQ(png_size(scratch.file("c.png")), std::make_pair(900u, 600u));
+}
+
+TEST(Plot, NamesThatWouldCoverEachOtherAreLeftOut) {
+  Chart chart;
+  chart.log_y = true;
+  Series series;
+  series.points = true;
+  for (int i = 0; i < 40; ++i) {
+    series.x.push_back(1 + 0.001 * i);
+    series.y.push_back(1);
+    series.names.push_back("crowd");
+  }
+  series.x.insert(series.x.end(), {2, 3});
+  series.y.insert(series.y.end(), {100, -1});  // the last one cannot be drawn
+  series.names.insert(series.names.end(), {"alone", "nowhere"});
+  chart.series.push_back(series);
+  const std::string commands = label_commands(chart);
+  EXPECT_THAT(commands, ::testing::HasSubstr("\"alone\" at first 2, first 100"));
+  EXPECT_THAT(commands, ::testing::Not(::testing::HasSubstr("nowhere")));
+  const auto lines = std::count(commands.begin(), commands.end(), '\n');
+  EXPECT_GE(lines, 3);
+  EXPECT_LE(lines, 7);
+}
+
+TEST(Plot, HeightsAreFromTheLowestToTheHighest) {
+  const auto heights = heights_in_body({0, 2, 0, 0, 4, 0, NAN, NAN, NAN, 0, 3, 0});
+  EXPECT_THAT(heights, ::testing::ElementsAre(0, 1, ::testing::NanSensitiveDoubleEq(NAN), 0.5));
+  EXPECT_THAT(heights_in_body({0, 2, 0}), ::testing::ElementsAre(0.5));
+}
+
+TEST(Plot, AColourBarStandsUnderThePanels) {
+  if (!gnuplot_available()) GTEST_SKIP() << "no gnuplot here";
+  const testing::Scratch scratch;
+  ParticlePicture picture;
+  picture.panels.push_back({"0 ms", {0.1, 0.2, 0.3, 0.5, 0.5, 0.5}, {1, NAN}});
+  ASSERT_TRUE(plot_particles(scratch.file("without.png"), picture));
+  picture.colour_label = "height `in` \"m\"";
+  ASSERT_TRUE(plot_particles(scratch.file("with.png"), picture));
+  EXPECT_EQ(png_size(scratch.file("with.png")).first, png_size(scratch.file("without.png")).first);
+  EXPECT_GT(png_size(scratch.file("with.png")).second,
+            png_size(scratch.file("without.png")).second);
 }
 
 TEST(Plot, CameraLooksTheRightWay) {
