@@ -47,4 +47,13 @@ DifferenceJacobian difference_jacobian(const Residuals& residuals, const Tensor&
   return result;
 }
 
+Eigen::MatrixXd normal_matrix(const Eigen::MatrixXd& J) {
+  const Eigen::Index n = J.cols();
+  Eigen::MatrixXd A(n, n);
+  kernels::for_each(n, [&](std::ptrdiff_t i) {
+    for (Eigen::Index j = 0; j <= i; ++j) A(i, j) = A(j, i) = J.col(i).dot(J.col(j));
+  });
+  return A;
+}
+
 }  // namespace uniphy

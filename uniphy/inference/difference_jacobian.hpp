@@ -28,4 +28,7 @@ DifferenceJacobian difference_jacobian(const Residuals& residuals, const torch::
                                        const torch::Tensor& residuals_there,
                                        const std::vector<std::int64_t>& columns, double step);
 
+/// JᵀJ, with the same bits on any number of threads.
+Eigen::MatrixXd normal_matrix(const Eigen::MatrixXd& J);
+
 }  // namespace uniphy

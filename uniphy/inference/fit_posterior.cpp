@@ -55,15 +55,15 @@ std::vector<std::array<Eigen::Index, 2>> windows_of(Eigen::Index rows, int count
 
 /// φ of scores Jᵀr of windows, each residual with that variance.
 double dispersion_of(const MatrixXd& J, const ConstVector& r, double variance, int count) {
-  const MatrixXd A = J.transpose() * J / variance;
+  const MatrixXd A = normal_matrix(J) / variance;
   const Eigen::SelfAdjointEigenSolver<MatrixXd> axes(A);
   const auto windows = windows_of(J.rows(), count);
   MatrixXd scores(J.cols(), static_cast<Eigen::Index>(windows.size()));
   for (std::size_t w = 0; w < windows.size(); ++w) {
     const auto [begin, end] = windows[w];
-    scores.col(static_cast<Eigen::Index>(w)) =
-        axes.eigenvectors().transpose() *
-        (J.middleRows(begin, end - begin).transpose() * r.segment(begin, end - begin)) / variance;
+    const VectorXd score =
+        J.middleRows(begin, end - begin).transpose() * r.segment(begin, end - begin);
+    scores.col(static_cast<Eigen::Index>(w)) = axes.eigenvectors().transpose() * score / variance;
   }
   double sum = 0;
   int told = 0;
@@ -234,12 +234,11 @@ FitPosterior fit_posterior(const Residuals& residuals, const Tensor& point,
   const double weight = 1 / (variance * result.dispersion / count + kLawError * kLawError);
   const Posterior posterior(residuals, point, columns, weight);
   const double top = -0.5 * weight * sum_of_squares(there);
-  Gaussian gaussian =
-      linear_gaussian(weight * (J.transpose() * J) + MatrixXd::Identity(size, size));
+  Gaussian gaussian = linear_gaussian(weight * normal_matrix(J) + MatrixXd::Identity(size, size));
   result.evaluations += fit_spreads(posterior, top, gaussian);
-  add_directions(
-      gaussian.axes * gaussian.spread.cwiseAbs2().asDiagonal() * gaussian.axes.transpose(),
-      size - motion, result);
+  const MatrixXd spread = gaussian.axes * gaussian.spread.asDiagonal();
+  // Eigen's other product may have the bits of a number of threads.
+  add_directions(spread.lazyProduct(spread.transpose()), size - motion, result);
   add_samples(posterior, gaussian, top, options, result);
   return result;
 }

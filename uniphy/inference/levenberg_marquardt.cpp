@@ -100,13 +100,9 @@ Tensor LevenbergMarquardt::step(const Residuals& residuals) {
         difference_jacobian(residuals, here, residuals_, columns, options().difference());
     evaluations_ += slopes.evaluations;
     const Eigen::MatrixXd& J = slopes.J;
-    const Eigen::Index n = J.cols();
-    Eigen::MatrixXd A(n, n);
-    Eigen::VectorXd g(n);
-    kernels::for_each(n, [&](std::ptrdiff_t i) {
-      for (Eigen::Index j = 0; j <= i; ++j) A(i, j) = A(j, i) = J.col(i).dot(J.col(j));
-      g[i] = J.col(i).dot(vector_of(residuals_));
-    });
+    const Eigen::MatrixXd A = normal_matrix(J);
+    Eigen::VectorXd g(J.cols());
+    for (Eigen::Index i = 0; i < g.size(); ++i) g[i] = J.col(i).dot(vector_of(residuals_));
     const Trial best = best_trial(residuals, J, A, g);
     if (best.loss < loss_) {
       move_to(best.point);

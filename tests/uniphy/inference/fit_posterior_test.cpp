@@ -131,12 +131,18 @@ TEST(FitPosterior, WithoutARollOutThereIsNone) {
 }
 
 TEST(FitPosterior, TheSameBitsOnOneThreadAndOnTwo) {
-  std::mt19937 random(3);
-  const Tensor values = normal_rows(random, 0.02);
+  // Large enough for a product of matrices to be done by several threads.
+  constexpr int kMany = 20000;
+  const Tensor t = torch::linspace(-1, 1, kMany, torch::kFloat64);
+  const auto curve = [t](const Tensor& u) {
+    Tensor r = 1e-3 * (40 * t).sin();
+    for (int k = 0; k < 8; ++k) r = r + u[k] * t.pow(k);
+    return r / std::sqrt(double(kMany));
+  };
   const auto samples = [&] {
+    const Tensor point = torch::zeros({8}, torch::kFloat64);
     return torch::stack(
-        fit_posterior(line_through(values), least_squares_line(values), {0, 1, 2}, 0, kRows, {})
-            .samples);
+        fit_posterior(curve, point, {0, 1, 2, 3, 4, 5, 6, 7}, 0, kMany, {}).samples);
   };
   EXPECT_TRUE(testing::on_threads(1, samples).equal(testing::on_threads(2, samples)));
 }

@@ -197,7 +197,7 @@ TEST_P(StoppedAfter, GoesOnToTheSameBits) {
 INSTANTIATE_TEST_SUITE_P(Records, StoppedAfter,
                          ::testing::Values(Stop{"lbfgs", 15}, Stop{"lbfgs", 24}, Stop{"lbfgs", 34},
                                            Stop{"adamw", 6}, Stop{"adamw", 24}, Stop{"adamw", 34},
-                                           Stop{kLevenbergMarquardt, 40},
+                                           Stop{kLevenbergMarquardt, 80},
                                            Stop{kLevenbergMarquardt, 150}));
 
 TEST(Fit, ACandidateThatFailsIsDroppedAndTheOthersGoOn) {

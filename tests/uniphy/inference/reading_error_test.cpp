@@ -40,8 +40,8 @@ TEST(ReadingError, IsWhatTheCodesOfAMaterialAreOffBy) {
 }
 
 TEST(ReadingError, IsNotKnownOfAnAnalyticFit) {
-  const auto variables = make_analytic_variables(
-      kernels::LawId::elastic, default_ranges(kernels::LawId::elastic), 5, 1);
+  const auto variables = make_analytic_variables(kernels::LawId::elastic,
+                                                 default_ranges(kernels::LawId::elastic), 5, 1);
   EXPECT_TRUE(std::isnan(reading_error(*variables, "elastic", 5e-4, 0.3).mu));
 }
 
