@@ -76,7 +76,9 @@ CaseResult identify_one(const IdentifyOptions& options, std::int64_t material,
   const std::string name = (folder / "observation.h5").string();
   const Observation observation = read_observation(name);
   std::fprintf(stderr, "%s\n", row.material.c_str());
-  Inference result = infer(observation, name, variables, options.fit, {});
+  AdaptationOptions adaptation{{Rung::latent}};
+  adaptation.samples = 0;  // the table has no intervals
+  Inference result = infer(observation, name, variables, options.fit, {}, adaptation);
   if (fields.F) result.fitted.F = std::move(result.deformation);
   write_latent(folder / "latent.h5",
                latent_of(result, observation, variables, options.variables.model.string(),

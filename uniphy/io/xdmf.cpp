@@ -1,32 +1,10 @@
 #include <fmt/format.h>
 
+#include "uniphy/io/markup.hpp"
 #include "uniphy/io/trajectory.hpp"
 
 namespace uniphy {
 namespace {
-
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      default:
-        out += c;
-    }
-  }
-  return out;
-}
 
 /// A whole dataset of the file.
 std::string data_item(const std::string& h5, const std::string& name, const std::string& dimensions,
@@ -46,7 +24,7 @@ std::string xdmf_view(std::size_t frame, const std::string& field) {
 
 std::string xdmf_text(const std::string& h5_name, std::int64_t particles,
                       const std::vector<double>& times, FrameFields fields) {
-  const std::string h5 = escaped(h5_name);
+  const std::string h5 = markup_escaped(h5_name);
   const std::string count = std::to_string(particles);
   const auto attribute = [](const char* name, const char* type, const std::string& item) {
     return fmt::format(

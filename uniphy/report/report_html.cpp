@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "ops/kernels/base/error.hpp"
+#include "uniphy/io/markup.hpp"
 #include "uniphy/report/report.hpp"
 #include "uniphy/report/report_page.hpp"
 #include "uniphy/report/report_payload.hpp"
@@ -55,7 +56,7 @@ std::string charts_json(const std::vector<Chart>& charts) {
 }
 
 std::string section(const std::string& id, const std::string& title, const std::string& html) {
-  return fmt::format("<section id=\"{}\">\n<h2>{}</h2>\n{}</section>\n", id, html_escaped(title),
+  return fmt::format("<section id=\"{}\">\n<h2>{}</h2>\n{}</section>\n", id, markup_escaped(title),
                      html);
 }
 
@@ -65,7 +66,7 @@ std::string details(const std::string& id, const std::string& title, bool open,
   return fmt::format(
       "<section id=\"{}\"><details{}>\n<summary><h2>{}</h2></summary>\n{}</details>"
       "</section>\n",
-      id, open ? " open" : "", html_escaped(title), html);
+      id, open ? " open" : "", markup_escaped(title), html);
 }
 
 std::string tables_html(const Report& report) {
@@ -80,7 +81,7 @@ std::string metrics_html(const Metrics& metrics, bool open) {
   if (metrics.entries().empty()) return "";
   std::string html = "<div class=\"wide\"><table>\n";
   for (const auto& [name, value] : metrics.entries()) {
-    html += fmt::format("<tr><td>{}</td><td class=\"number\">{}</td></tr>\n", html_escaped(name),
+    html += fmt::format("<tr><td>{}</td><td class=\"number\">{}</td></tr>\n", markup_escaped(name),
                         std::isfinite(value) ? fmt::format("{:.6g}", value) : "–");
   }
   return details("metrics", "Metrics", open, html + "</table></div>\n");
@@ -88,21 +89,21 @@ std::string metrics_html(const Metrics& metrics, bool open) {
 
 /// The parts of the page that do not depend on how finely the motions are written.
 Places places_of(const Report& report, const ReportRun& run) {
-  return {{"name", html_escaped(run.name)},
-          {"summary", html_escaped(run.summary)},
-          {"source", html_escaped(run.source)},
+  return {{"name", markup_escaped(run.name)},
+          {"summary", markup_escaped(run.summary)},
+          {"source", markup_escaped(run.source)},
           {"failure", run.failure.empty()
                           ? ""
                           : fmt::format("<p class=\"failure\" role=\"alert\">The run ended before "
                                         "its time: {}</p>\n",
-                                        html_escaped(run.failure))},
+                                        markup_escaped(run.failure))},
           {"style", page::style},
           {"tables", tables_html(report)},
           {"player", report.playbacks.empty() ? "" : section("player", "Motions", "")},
           {"charts", report.charts.empty() ? "" : section("charts", "Charts", "")},
           {"metrics", metrics_html(run.metrics, report.empty())},
           {"config", details("config", "Configuration", false,
-                             "<pre class=\"wide\">" + html_escaped(run.config) + "</pre>\n")},
+                             "<pre class=\"wide\">" + markup_escaped(run.config) + "</pre>\n")},
           {"charts-json", charts_json(report.charts)},
           {"script", script_text(page::script)}};
 }

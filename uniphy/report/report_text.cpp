@@ -4,6 +4,8 @@
 #include <sstream>
 #include <vector>
 
+#include "uniphy/io/markup.hpp"
+
 namespace uniphy {
 namespace {
 
@@ -42,7 +44,7 @@ std::string html_row(const std::string& line, const char* tag) {
   std::string html = "<tr>";
   for (const std::string& cell : cells_of(line)) {
     html += std::string("<") + tag + (is_number(cell) ? " class=\"number\">" : ">") +
-            html_escaped(cell) + "</" + tag + ">";
+            markup_escaped(cell) + "</" + tag + ">";
   }
   return html + "</tr>\n";
 }
@@ -59,33 +61,6 @@ std::string html_table(const std::vector<std::string>& rows) {
 }
 
 }  // namespace
-
-std::string html_escaped(const std::string& text) {
-  std::string out;
-  out.reserve(text.size());
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      case '\'':
-        out += "&#39;";
-        break;
-      default:
-        out += c;
-    }
-  }
-  return out;
-}
 
 std::string script_json(std::string json) {
   replace_all(json, "<", "\\u003c");
@@ -105,7 +80,7 @@ std::string html_of_markdown(const std::string& text) {
   bool any = false;
   const auto end_block = [&] {
     if (!rows.empty()) html += html_table(rows);
-    if (!paragraph.empty()) html += "<p>" + html_escaped(paragraph) + "</p>\n";
+    if (!paragraph.empty()) html += "<p>" + markup_escaped(paragraph) + "</p>\n";
     any = any || !rows.empty();
     rows.clear();
     paragraph.clear();
@@ -120,7 +95,7 @@ std::string html_of_markdown(const std::string& text) {
     }
   }
   end_block();
-  return any ? html : "<pre class=\"wide\">" + html_escaped(text) + "</pre>\n";
+  return any ? html : "<pre class=\"wide\">" + markup_escaped(text) + "</pre>\n";
 }
 
 }  // namespace uniphy

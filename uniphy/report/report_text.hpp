@@ -4,9 +4,6 @@
 
 namespace uniphy {
 
-/// Text for HTML, between tags and in quoted attributes.
-std::string html_escaped(const std::string& text);
-
 /// JSON for a <script> element: no < of it can end the element or begin a comment.
 std::string script_json(std::string json);
 
