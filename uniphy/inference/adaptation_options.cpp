@@ -47,12 +47,11 @@ AdaptationOptions read_adaptation_options(Section& config) {
                   "length of its first step (adamw: of every step, falling along a cosine)");
   o.pull = s.real("pull", o.pull, Range{0, 1e6}, "",
                   "adds pull |W - W0|^2 to mse/size^2 for all weights W but the law's own numbers");
-  constexpr int kOfChains = 8;
   o.samples = static_cast<int>(
       s.integer("samples", o.samples, between(0, 100000), "",
                 "laws drawn from the posterior, from which probabilities and intervals are taken, "
                 "one to two roll-outs each; a multiple of 8. 0: none, and no intervals"));
-  if (!config.describing() && o.samples % kOfChains != 0) {
+  if (!config.describing() && o.samples % kPosteriorChains != 0) {
     s.fail("samples", "expected a multiple of 8, found " + std::to_string(o.samples));
   }
   return o;

@@ -63,7 +63,7 @@ class Fit {
   std::int64_t most_work(const FitStage& stage) const {
     if (stage.optimizer != kLevenbergMarquardt) return stage.epochs;
     return std::int64_t(stage.epochs) *
-           (variables_.size() + FitProblem::kMotion + LevenbergMarquardt::kTrials);
+           (variables_.size() + FitProblem::kMotion + LevenbergMarquardt::kTrialEvaluations);
   }
 
   /// Saves where it is time to, tells the user, and stops where the user asked for it.

@@ -20,7 +20,6 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using torch::Tensor;
 
-constexpr int kChains = 8;
 /// Samples of a chain that are left out: it begins at the point itself.
 constexpr int kWarmUp = 2;
 /// Points that are tried for a sample; the bracket is halved by each, about.
@@ -177,12 +176,12 @@ void add_samples(const Posterior& posterior, const Gaussian& gaussian, double le
                  const PosteriorOptions& options, FitPosterior& result) {
   const SliceSampler sampler(posterior, gaussian);
   const Eigen::Index size = gaussian.spread.size();
-  const int of_chain = options.samples / kChains;
+  const int of_chain = options.samples / kPosteriorChains;
   if (of_chain == 0) return;
-  std::vector<std::vector<Tensor>> chains(kChains);
-  std::vector<int> tries(kChains, 0);
+  std::vector<std::vector<Tensor>> chains(kPosteriorChains);
+  std::vector<int> tries(kPosteriorChains, 0);
   std::atomic<int> done{0};
-  kernels::for_each(kChains, [&](std::ptrdiff_t c) {
+  kernels::for_each(kPosteriorChains, [&](std::ptrdiff_t c) {
     const torch::NoGradGuard no_grad;
     UniformRandom random(static_cast<std::uint64_t>(c) + 1);
     VectorXd f = VectorXd::Zero(size);
@@ -194,7 +193,7 @@ void add_samples(const Posterior& posterior, const Gaussian& gaussian, double le
       if (c == 0 && options.progress) options.progress(done);
     }
   });
-  for (int c = 0; c < kChains; ++c) {
+  for (int c = 0; c < kPosteriorChains; ++c) {
     result.evaluations += tries[c];
     result.samples.insert(result.samples.end(), chains[c].begin(), chains[c].end());
   }

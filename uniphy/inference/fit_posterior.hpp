@@ -27,11 +27,13 @@ struct FitPosterior {
   int evaluations = 0;                 ///< roll-outs
 };
 
+/// Chains of samples, side by side.
+inline constexpr int kPosteriorChains = 8;
 /// A direction whose standard deviation is below this part of that of the prior is determined.
 inline constexpr double kDetermined = 0.5;
 
 struct PosteriorOptions {
-  int samples = 64;  ///< at most; a multiple of 8
+  int samples = 64;  ///< a multiple of kPosteriorChains
   /// Rows of a Jacobian that are next to each other in time are in one window.
   int windows = 10;
   double noise = 0;  ///< of a coordinate, in the unit of ‖r‖; 0: not known
@@ -57,8 +59,9 @@ struct PosteriorOptions {
 /// says, or less where the posterior itself falls faster: where a slope is nil, the square of a
 /// move may tell much. Samples correct it further, in particular for a material that begins to
 /// yield a little beyond what was seen, which shows on one side alone: elliptical slice sampling
-/// (I. Murray, R. Adams and D. MacKay, AISTATS 2010) with the Gaussian as its prior, kChains chains
-/// side by side. The same bits on any number of threads.
+/// (I. Murray, R. Adams and D. MacKay, AISTATS 2010) with the Gaussian as its prior,
+/// kPosteriorChains chains side by side. The same bits on any number of threads. Empty where there
+/// are no residuals at the point.
 FitPosterior fit_posterior(const Residuals& residuals, const torch::Tensor& point,
                            const std::vector<std::int64_t>& columns, int motion, double count,
                            const PosteriorOptions& options);

@@ -215,13 +215,13 @@ void add_metrics(Metrics& metrics, const Inference& inference, const Observation
     metrics.set(fmt::format("velocity.{}", axes[k]), fit.motion.linear[k]);
     metrics.set(fmt::format("angular_velocity.{}", axes[k]), fit.motion.angular[k]);
   }
-  if (!fit.determined) return;
-  add_material(metrics, inference.material);
   if (!inference.posterior.spread.empty()) {
     metrics.set("directions", static_cast<double>(inference.posterior.spread.size()));
     metrics.set("directions_determined", inference.posterior.determined);
     metrics.set("dispersion", inference.posterior.dispersion);
   }
+  if (!fit.determined) return;
+  add_material(metrics, inference.material);
   metrics.set("nearest.distance", variables.nearest(fit.u, 1).front().distance);
   for (const FittedParameter& p : fitted_parameters(fit.law, variables)) {
     metrics.set("parameter." + p.name, p.value);

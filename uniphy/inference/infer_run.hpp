@@ -66,15 +66,15 @@ std::optional<std::size_t> roll_outs_to_a_hundredth(const FitResult& fit);
 /// contact (1, or 0 where no wall acted before the last frame), contact_s,
 /// start_residual_over_size, start_allowed_over_size, start_frames, noise_over_size,
 /// energy_gain_over_kinetic (ObservationCheck; 0 of a body that does not move),
-/// velocity.{x,y,z}, angular_velocity.{x,y,z}, determined (1 or 0); where the material is
+/// velocity.{x,y,z}, angular_velocity.{x,y,z}, determined (1 or 0), with a posterior directions
+/// (numbers of the fit), directions_determined, dispersion (FitPosterior); where the material is
 /// determined, explained (1 or 0), rung (0 latent, 1 numbers, 2 weights) and, where frames were
 /// kept, of every rung that was tried fitted_over_size.RUNG, kept_over_size.RUNG, roll_outs.RUNG,
 /// seconds.RUNG; material.NAME (1 of what the law behaves like), probability.NAME,
 /// reading.{mu, lambda, young, poisson, yield_stress, friction_angle, cohesion, viscosity} where it
 /// has one (MaterialReading, SI units) with the ends of its 90 % interval, reading.NAME.low and
-/// .high; directions (numbers of the fit), directions_determined, dispersion (FitPosterior);
-/// nearest.distance and, of an analytic law, parameter.NAME and outside_range.NAME (1 where it
-/// ended outside of its range).
+/// .high; nearest.distance and, of an analytic law, parameter.NAME and outside_range.NAME (1 where
+/// it ended outside of its range).
 void add_metrics(Metrics& metrics, const Inference& inference, const Observation& observation,
                  const FitVariables& variables);
 

@@ -155,7 +155,7 @@ LevenbergMarquardt::Trial LevenbergMarquardt::best_trial(const Residuals& residu
       trial.residuals = residuals(trial.point);
       trial.loss = sum_of_squares(trial.residuals);
     });
-    evaluations_ += 2 * static_cast<int>(trials.size());
+    evaluations_ += kTrialEvaluations;
     for (const Trial& trial : trials) {
       if (trial.loss < best.loss) best = trial;
     }

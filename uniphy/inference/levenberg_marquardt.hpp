@@ -30,6 +30,9 @@ struct LevenbergMarquardtOptions
 /// lowest end, which alone would follow the floor of a curved valley in short steps; there the next
 /// step looks. Where none is lower, λ grows.
 ///
+/// Each step is bent by what the residuals show of their curvature a part of it ahead (geodesic
+/// acceleration; M. Transtrum and J. Sethna, arXiv:1201.5885), which follows a curved valley.
+///
 /// A number that moves nothing (a column of zeros) stays where it is. Evaluations run side by side
 /// (kernels::for_each); sums have one order, so that results have the same bits on any number of
 /// threads.
@@ -37,6 +40,8 @@ class LevenbergMarquardt : public torch::optim::Optimizer {
  public:
   /// Dampings that are tried at once.
   static constexpr int kTrials = 4;
+  /// Of residuals, that these take: one for the curvature and one at the end of the step each.
+  static constexpr int kTrialEvaluations = 2 * kTrials;
 
   /// The leaves, float64, are moved in place.
   LevenbergMarquardt(std::vector<torch::Tensor> leaves, const LevenbergMarquardtOptions& options);

@@ -17,7 +17,7 @@ struct MaterialReading {
   /// step), sand (bears no shear without pressure) or non_newtonian (yields, and flows at a rate).
   /// A body that did not yield at the strains that it saw is called elastic.
   std::string material;
-  double mu = kNone;      ///< Pa, of small shear under slight compression
+  double mu = kNone;      ///< Pa, of small shear, from slight compressions to none
   double lambda = kNone;  ///< Pa; of a fluid its bulk modulus
   double young = kNone, poisson = kNone;
   double yield_stress = kNone;    ///< Pa, the norm of the deviator of τ without pressure

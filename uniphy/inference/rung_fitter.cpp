@@ -101,7 +101,7 @@ Tensor RungFitter::least_squares(const Observation& seen, std::ptrdiff_t frames,
         torch::cat({all.weight, motion_pull(problem, from, frames, starts ? &*starts : nullptr)});
   }
   const int columns = static_cast<int>(from.numel());
-  const int roll_outs = iterations * (columns + LevenbergMarquardt::kTrials);
+  const int roll_outs = iterations * (columns + LevenbergMarquardt::kTrialEvaluations);
   const Tensor point = work(rung, task, roll_outs, [&](RungTask& t, const AfterStep& after) {
     return uniphy::least_squares(problem, from, all, frames, iterations,
                                  starts ? &*starts : nullptr, t, after);

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <optional>
+
 #include "ops/kernels/laws/law_parameters.hpp"
 #include "tests/support/published_return.hpp"
 #include "tests/uniphy/inference/observed_scene.hpp"
@@ -40,6 +42,25 @@ Observation in_flight() {
   scene.motion = {{0.5, 0.5, 0.5}, {0.3, 0, 0}, {0, 0, 0}};
   scene.frames = 11;
   return testing::observe(testing::elastic_body(1e5, 2e5), scene);
+}
+
+TEST(FitFindings, AContactThatTellsNothingNamesNoMaterial) {
+  const Observation whole = testing::observe(testing::elastic_body());
+  Observation o = first_frames(whole, 16);
+  o.noise = 0.3;  // as large as the body
+  const auto variables = elastic_variables({1e3, 1e6}, {1e3, 1e6});
+  const Inference found = fitted(o, *variables);
+  ASSERT_LT(found.fit.contact, o.frames);
+  EXPECT_FALSE(found.fit.determined);
+  EXPECT_THAT(fit_warnings(found, o, *variables),
+              ::testing::Contains(HasSubstr("determines none of the 2 numbers")));
+  Metrics metrics;
+  add_metrics(metrics, found, o, *variables);
+  EXPECT_EQ(metrics.find("contact"), 1);
+  EXPECT_EQ(metrics.find("determined"), 0);
+  EXPECT_EQ(metrics.find("directions"), 2);
+  EXPECT_EQ(metrics.find("directions_determined"), 0);
+  EXPECT_EQ(metrics.find("reading.mu"), std::nullopt);
 }
 
 TEST(FitFindings, FreeFlightNamesNoMaterial) {
