@@ -41,12 +41,19 @@ int main(int argc, char** argv) {
        "DIR/metrics.json    forecast.CASE.M, floor.CASE.M (root over size), fit.CASE.M,",
        "                    explained.CASE.M, named_right.CASE.M, fit_s.CASE.M,",
        "                    fit_rollouts.CASE.M of every material M: medians over scenes; fits",
-       "DIR/open_world.md, open_world.csv, DIR/fits"},
+       "DIR/open_world.md, open_world.csv, DIR/fits",
+       "materials:",
+       "DIR/metrics.json    class_right.CASE, class_total.CASE, mu_error.CASE, lambda_error.CASE",
+       "                    (elastic), yield_error.CASE (plasticine), friction_error.CASE (sand),",
+       "                    coverage.CASE of their 90 % intervals; error.NUMBER.CASE.M,",
+       "                    coverage.NUMBER.CASE.M of every material M; fits, fits_failed",
+       "DIR/materials.md, materials.csv, DIR/fits"},
       {"uniphy_evaluate configs/evaluate/trajectory.yaml --set trajectory=out/resim/trajectory.h5 "
        "--set reference=out/truth/trajectory.h5",
        "uniphy_evaluate configs/evaluate/heldout.yaml --set seed=7",
        "uniphy_evaluate configs/evaluate/outside.yaml --set quick=true",
-       "uniphy_evaluate configs/evaluate/open_world.yaml --set cases=[noise]"}};
+       "uniphy_evaluate configs/evaluate/open_world.yaml --set cases=[noise]",
+       "uniphy_evaluate configs/evaluate/materials.yaml --set objects.count=2"}};
   return uniphy::run_experiment(
       argc, argv, info, [](uniphy::Section& config) { return uniphy::evaluate_stage(config); });
 }

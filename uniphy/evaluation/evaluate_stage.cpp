@@ -6,6 +6,7 @@
 
 #include "ops/kernels/base/error.hpp"
 #include "uniphy/evaluation/heldout_stage.hpp"
+#include "uniphy/evaluation/materials_stage.hpp"
 #include "uniphy/evaluation/open_world_stage.hpp"
 #include "uniphy/evaluation/outside_stage.hpp"
 #include "uniphy/io/atomic_file.hpp"
@@ -102,7 +103,9 @@ RunFunction evaluate_stage(Section& config) {
        {"outside", "forecasts of motions by laws that the trained one was not built around",
         [&run](Section& keys) { run = outside_stage(keys); }},
        {"open_world", "forecasts from what a laboratory sees: noise, tracked points, finer truths",
-        [&run](Section& keys) { run = open_world_stage(keys); }}},
+        [&run](Section& keys) { run = open_world_stage(keys); }},
+       {"materials", "what held-out objects are made of, read off their motion, with intervals",
+        [&run](Section& keys) { run = materials_stage(keys); }}},
       "what is evaluated");
   return run;
 }

@@ -59,19 +59,29 @@ void FinishedFits::write(const std::filesystem::path& stem, const Forecast& resu
   m.set("roll_outs", result.roll_outs);
   m.set("seconds", seconds);
   if (!result.material.empty()) m.set("material." + result.material, 1);
-  m.write(with_ending(stem, ".json"));
+  write(stem, m);
+}
+
+void FinishedFits::write(const std::filesystem::path& stem, const Metrics& result) {
+  result.write(with_ending(stem, ".json"));
   const std::filesystem::path state = hooks(stem).state_file;
   std::error_code ignored;
   std::filesystem::remove(state, ignored);
   std::filesystem::remove(adaptation_state_file(state), ignored);
 }
 
-bool FinishedFits::read(const std::filesystem::path& stem, Forecast& result, double& seconds) {
+std::optional<Metrics> FinishedFits::read(const std::filesystem::path& stem) {
   const std::filesystem::path file = with_ending(stem, ".json");
-  if (!std::filesystem::exists(file)) return false;
-  const Metrics m = Metrics::read(file);
+  if (!std::filesystem::exists(file)) return {};
+  return Metrics::read(file);
+}
+
+bool FinishedFits::read(const std::filesystem::path& stem, Forecast& result, double& seconds) {
+  const std::optional<Metrics> m = read(stem);
+  if (!m) return false;
+  const std::filesystem::path file = with_ending(stem, ".json");
   const auto number = [&](const char* name) {
-    const auto value = m.find(name);
+    const auto value = m->find(name);
     if (!value) throw Error(fmt::format("{}: {}: missing", file.string(), name));
     // JSON has no infinity.
     return std::isnan(*value) ? std::numeric_limits<double>::infinity() : *value;
@@ -84,7 +94,7 @@ bool FinishedFits::read(const std::filesystem::path& stem, Forecast& result, dou
   result.roll_outs = number("roll_outs");
   seconds = number("seconds");
   for (const MaterialRanges& family : default_material_ranges()) {
-    if (m.find("material." + family.name())) result.material = family.name();
+    if (m->find("material." + family.name())) result.material = family.name();
   }
   return true;
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include "uniphy/evaluation/forecast.hpp"
@@ -22,6 +23,9 @@ class FinishedFits {
   static FitHooks hooks(const std::filesystem::path& stem);
   /// Keeps what it came to, and the seconds it took, and removes its state.
   static void write(const std::filesystem::path& stem, const Forecast& result, double seconds);
+  static void write(const std::filesystem::path& stem, const Metrics& result);
+  /// Nothing where it is not finished. Throws Error where the file is damaged.
+  static std::optional<Metrics> read(const std::filesystem::path& stem);
   /// False where it is not finished. Throws Error where the file is damaged.
   static bool read(const std::filesystem::path& stem, Forecast& result, double& seconds);
 

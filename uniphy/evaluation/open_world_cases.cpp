@@ -5,27 +5,11 @@
 #include <array>
 
 #include "ops/kernels/base/error.hpp"
-#include "uniphy/data/laboratory_view.hpp"
 
 namespace uniphy {
 namespace {
 
 constexpr int kFiner = 2;  ///< grid and particles along a side; the step is its square finer
-
-LaboratoryView view_of(OpenWorldCase c, double noise, std::uint64_t seed) {
-  LaboratoryView view;
-  view.seed = seed;
-  if (c == OpenWorldCase::closed || c == OpenWorldCase::finer) return view;
-  view.noise = noise;
-  if (c == OpenWorldCase::noise) {
-    view.says_noise = false;  // it can be estimated
-    return view;
-  }
-  view.share = 0.1;
-  view.stride = 10;
-  if (c == OpenWorldCase::hidden) view.hidden = 1.0 / 3;
-  return view;
-}
 
 /// The scene with a lattice twice as fine, on a grid twice as fine, the walls at their place.
 OutsideScene finer(const OutsideScene& scene) {
@@ -86,6 +70,21 @@ RigidMotion initial_motion(const OutsideScene& scene, const Observation& seen) {
 }
 
 }  // namespace
+
+LaboratoryView view_of(OpenWorldCase c, double noise, std::uint64_t seed) {
+  LaboratoryView view;
+  view.seed = seed;
+  if (c == OpenWorldCase::closed || c == OpenWorldCase::finer) return view;
+  view.noise = noise;
+  if (c == OpenWorldCase::noise) {
+    view.says_noise = false;  // it can be estimated
+    return view;
+  }
+  view.share = 0.1;
+  view.stride = 10;
+  if (c == OpenWorldCase::hidden) view.hidden = 1.0 / 3;
+  return view;
+}
 
 const char* case_name(OpenWorldCase c) { return kOpenWorldCases[static_cast<int>(c)]; }
 

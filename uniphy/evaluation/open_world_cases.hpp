@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "uniphy/data/laboratory_view.hpp"
 #include "uniphy/evaluation/forecast.hpp"
 #include "uniphy/evaluation/outside_scenes.hpp"
 
@@ -19,6 +20,9 @@ enum class OpenWorldCase {
 };
 inline constexpr const char* kOpenWorldCases[] = {"closed", "noise", "tracked", "hidden", "finer"};
 const char* case_name(OpenWorldCase c);
+/// How a laboratory sees a motion in a case; noise: standard deviation of a coordinate over the
+/// size of the body. Of `finer`, the view of the closed world.
+LaboratoryView view_of(OpenWorldCase c, double noise, std::uint64_t seed);
 
 struct OpenWorldMotion {
   JudgedMotion motion;

@@ -25,11 +25,22 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// Iterations at each horizon that show which start is worth going on with: of water and jelly,
 /// begun from codes of other materials, the right ones are ahead after three.
 constexpr int kTrialIterations = 4;
+/// Ends of the fit by gradients that least squares go on from where the starts of noisy points are
+/// fitted, too; iterations of each at a horizon, and of the better half after those. A law that is
+/// not settled at one horizon may be too far off for the next: elastic cubes ended at 0.7 of lambda
+/// in a basin that nothing led out of.
+constexpr int kEnds = 4;
+constexpr int kEndIterations = 2;
+constexpr int kEndIterationsAhead = 4;
+/// Share of the loss that one of these has to take away for another.
+constexpr double kEndGain = 0.01;
 /// Fits of z between which the starts of noisy points are moved to where the last one has them: the
 /// flow that says where is that of the fit before.
-constexpr int kStartRounds = 3;
+constexpr int kStartRounds = 6;
 /// Iterations of those after the first.
 constexpr int kRoundIterations = 4;
+/// Share of the loss that a round has to take away for another.
+constexpr double kRoundGain = 1e-3;
 /// Iterations, and the share of the epochs, of the last fit to the whole observation: it begins
 /// next to where it ends.
 constexpr int kLastIterations = 4;
@@ -117,7 +128,7 @@ class Ladder {
   Climber fit_latent() {
     RungTask& task = fitter_.state().task("latent");
     const auto begin = std::chrono::steady_clock::now();
-    result_.fit = fit_observation(part_, name_, latent_, options_, hooks_);
+    result_.fit = fit_observation(part_, name_, latent_, latent_options(), hooks_);
     const std::chrono::duration<double> time = std::chrono::steady_clock::now() - begin;
     if (!task.done) {
       task.seconds = time.count();
@@ -127,19 +138,110 @@ class Ladder {
     }
     fitter_.report(Rung::latent).roll_outs += task.roll_outs;
     fitter_.report(Rung::latent).seconds += task.seconds;
-    fitter_.set_motion(result_.fit.motion);
-    Climber c{latent_.label(result_.fit.start), to_tensor(result_.fit.u), {}};
     const bool converged = options_.stages.back().optimizer == kLevenbergMarquardt;
     const int rounds = fits_starts_ ? kStartRounds : converged ? 0 : 1;
+    const FitEnd end = fits_starts_ ? best_end() : result_.fit.ends.front();
+    fitter_.set_motion(end.motion);
+    result_.fit.start = end.start;
+    Climber c{latent_.label(end.start), to_tensor(end.u), {}};
+    double loss = kInfinity;
+    Observation before = part_;  // the last one whose starts were moved
     for (int round = 0; round < rounds; ++round) {
       const std::string name = round == 0 ? "code" : fmt::format("code, round {}", round + 1);
-      c.point =
+      const RigidMotion motion = fitter_.motion();
+      const LeastSquaresEnd to =
           fitter_.least_squares(part_, part_.frames, Rung::latent, c.point, c.point, least_pull(),
-                                name, round == 0 ? adaptation_.iterations : kRoundIterations, true);
-      if (fits_starts_) move_starts(Rung::latent, c.point, part_);
+                                name, round == 0 ? adaptation_.iterations : kRoundIterations,
+                                fits_starts_ ? FitVelocity::yes : FitVelocity::held);
+      if (round > 0 && !(to.loss < loss)) {  // the starts moved too far
+        fitter_.set_motion(motion);
+        take_starts(before);
+        break;
+      }
+      c.point = to.point;
+      const bool settled = !(to.loss < (1 - kRoundGain) * loss);
+      loss = to.loss;
+      if (!fits_starts_) break;
+      before = part_;
+      move_starts(Rung::latent, c.point, part_);
+      if (settled) break;
+    }
+    explained_ = std::sqrt(loss) <= enough_;
+    if (fits_starts_ &&
+        !explained_) {  // by a law beside the family, or a grid: not by the velocity
+      c.point =
+          fitter_
+              .least_squares(part_, part_.frames, Rung::latent, c.point, c.point, least_pull(),
+                             "code, velocity held", kRoundIterations, FitVelocity::held)
+              .point;
+      move_starts(Rung::latent, c.point, part_);
     }
     conclude(c, Rung::latent);
     return c;
+  }
+
+  /// Of noisy points gradients see errors of the starts as if they were of the law, the more the
+  /// longer the roll-out: over all frames least squares do better from where the stage before ends.
+  FitOptions latent_options() const {
+    FitOptions options = options_;
+    if (fits_starts_ && options.stages.size() > 1) {
+      options.stages.back().epochs = 0;
+      options.stages.back().candidates = std::min(kEnds, (options.stages.end() - 2)->candidates);
+    }
+    return options;
+  }
+
+  /// An end of the fit by gradients on its way.
+  struct Runner {
+    FitEnd end;
+    std::size_t number;
+    Observation seen;  ///< the part that is fitted, with the starts that this law has found
+    double loss = kInfinity;
+  };
+
+  /// The end of the fit by gradients that least squares get furthest from: at growing horizons, of
+  /// which each leaves the better half.
+  FitEnd best_end() {
+    std::vector<Runner> runners;
+    for (const FitEnd& end : result_.fit.ends) runners.push_back({end, runners.size() + 1, part_});
+    std::vector<std::ptrdiff_t> horizons;
+    for (const FitStage& stage : options_.stages)
+      horizons.push_back(horizon_frames(stage.horizon, result_.fit.contact, part_.frames));
+    std::sort(horizons.begin(), horizons.end());
+    for (std::size_t s = 0; s < horizons.size() && runners.size() > 1; ++s) {
+      const auto all_run = [&](const char* name, int iterations) {
+        for (Runner& r : runners)
+          run(r, horizons[s], fmt::format("{} {}, horizon {}", name, r.number, s + 1), iterations);
+      };
+      all_run("end", kEndIterations);
+      std::stable_sort(runners.begin(), runners.end(),
+                       [](const Runner& a, const Runner& b) { return a.loss < b.loss; });
+      runners.erase(runners.begin() + static_cast<std::ptrdiff_t>((runners.size() + 1) / 2),
+                    runners.end());
+      if (horizons[s] < part_.frames) all_run("better end", kEndIterationsAhead);
+    }
+    take_starts(runners.front().seen);
+    return runners.front().end;
+  }
+
+  void run(Runner& r, std::ptrdiff_t frames, const std::string& task, int iterations) {
+    const Tensor from = to_tensor(r.end.u);
+    fitter_.set_motion(r.end.motion);
+    const LeastSquaresEnd to =
+        fitter_.least_squares(r.seen, frames, Rung::latent, from, from, least_pull(), task,
+                              iterations, FitVelocity::yes, kEndGain);
+    r.end.u.assign(to.point.data_ptr<double>(), to.point.data_ptr<double>() + to.point.numel());
+    r.end.motion = fitter_.motion();
+    r.loss = to.loss;
+    if (!std::isfinite(r.loss)) return;
+    const Tensor shift = fitter_.start_shift(first_frames(r.seen, frames), Rung::latent, to.point);
+    r.seen = with_corrected_starts(r.seen, shift);
+  }
+
+  /// The starts of its points are those of all that is fitted from now on.
+  void take_starts(const Observation& seen) {
+    observation_.body = part_.body = seen.body;
+    observation_.tracers = part_.tracers = seen.tracers;
   }
 
   void add_posterior(Rung rung, const Tensor& point) {
@@ -226,9 +328,12 @@ class Ladder {
     for (std::size_t s = 0; s + 1 < horizons.size(); ++s) {
       if (s > 0) pull *= kPullOfHorizons;
       for (Climber& c : climbers) {
-        c.point = fitter_.least_squares(
-            part_, horizons[s], Rung::numbers, c.point, c.start, std::max(pull, least_pull()),
-            fmt::format("{} {}", c.name, s + 1), kTrialIterations, false);
+        c.point =
+            fitter_
+                .least_squares(part_, horizons[s], Rung::numbers, c.point, c.start,
+                               std::max(pull, least_pull()), fmt::format("{} {}", c.name, s + 1),
+                               kTrialIterations, FitVelocity::no)
+                .point;
         c.kept = root_mean_square(fitter_.roots(c.point, Rung::numbers, horizons[s + 1]),
                                   horizons[s], horizons[s + 1]);
       }
@@ -239,9 +344,11 @@ class Ladder {
     Climber best = climbers.front();
     for (int k = 1; pull > least_pull(); ++k) {
       pull = std::max(kPullOfFits * pull, least_pull());
-      best.point = fitter_.least_squares(part_, part_.frames, Rung::numbers, best.point, best.start,
-                                         pull, fmt::format("{} last {}", best.name, k),
-                                         adaptation_.iterations, false);
+      best.point = fitter_
+                       .least_squares(part_, part_.frames, Rung::numbers, best.point, best.start,
+                                      pull, fmt::format("{} last {}", best.name, k),
+                                      adaptation_.iterations, FitVelocity::no)
+                       .point;
     }
     conclude(best, Rung::numbers);
     return best;
@@ -263,11 +370,15 @@ class Ladder {
     const Rung rung = result_.rung;
     const RigidMotion before = fitter_.motion();
     Climber last = best;
-    last.point = rung == Rung::weights
-                     ? fitter_.descend(observation_, best.point, task,
-                                       std::max(1, adaptation_.epochs / kLastShare))
-                     : fitter_.least_squares(observation_, observation_.frames, rung, best.point,
-                                             best.point, least_pull(), task, kLastIterations, true);
+    last.point =
+        rung == Rung::weights
+            ? fitter_.descend(observation_, best.point, task,
+                              std::max(1, adaptation_.epochs / kLastShare))
+            : fitter_
+                  .least_squares(observation_, observation_.frames, rung, best.point, best.point,
+                                 least_pull(), task, kLastIterations,
+                                 fits_starts_ && explained_ ? FitVelocity::yes : FitVelocity::held)
+                  .point;
     if (rung != Rung::latent && !fitter_.lasts(last.point, rung)) {
       last.point = best.point;
       fitter_.set_motion(before);
@@ -298,7 +409,8 @@ class Ladder {
   const std::ptrdiff_t fitted_frames_;
   const bool fits_starts_;
   RungFitter fitter_;
-  double noise_, enough_;  ///< over size
+  double noise_, enough_;   ///< over size
+  bool explained_ = false;  ///< by z alone, what is fitted of the observation
   Adaptation result_;
 };
 

@@ -61,8 +61,13 @@ struct Adaptation {
 /// 5. What the observation says about the numbers of that rung: fit_posterior.
 ///
 /// With z the initial velocity is fitted by LevenbergMarquardt. Where the points are tracers or
-/// noisy, where they start is, too (StartCorrection): eliminated within a fit and moved after it,
-/// until that settles. Noise-free observations of particles start where they are seen.
+/// noisy, where they start is, too (StartCorrection): eliminated by the flow at every iteration and
+/// moved after a fit, until that settles. Noise-free observations of particles start where they are
+/// seen. What gradients see of noisy starts is an error of the law, the more the longer the
+/// roll-out: there they end before the last stage, and least squares go on from several of their
+/// ends, over the horizons of the schedule, of which each leaves the better half. The velocity then
+/// is known to what the noise of the first frames leaves of it, and is held to them only where the
+/// best law misses more than noise (FitVelocity).
 ///
 /// Analytic variables have no rung but `latent`; where that is the only one, all frames are fitted.
 /// Without a contact it is fit_observation alone. Resumes like it, with adaptation_state_file()

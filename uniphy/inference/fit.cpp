@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <numeric>
 #include <optional>
 #include <set>
 
@@ -103,20 +104,16 @@ class Fit {
     return state_.start_mse[start * stages() + stage];
   }
 
+  /// All starts up to the first horizon, and over all frames those that may be chosen by that.
   void rank() {
     const int starts = variables_.starts();
-    std::vector<double> table(starts * stages(), kInfinity);
-    constexpr int kBlock = 32;  // between two looks at the clock
-    for (int first = 0; first < starts; first += kBlock) {
-      const int count = std::min(kBlock, starts - first);
-      kernels::for_each(count, [&](int k) {
-        const int i = first + k;
-        const auto mse = problem_.frame_mse(problem_.candidate(i), problem_.frames());
-        for (int s = 0; s < stages(); ++s) {
-          table[i * stages() + s] = mean_of_first(mse, problem_.frames(s));
-        }
-      });
-      show_progress(count);
+    std::vector<double> table(starts * stages(), kNotRolledOut);
+    std::vector<int> all(starts);
+    std::iota(all.begin(), all.end(), 0);
+    roll_out(all, problem_.frames(0), table);
+    if (stages() > 1) {
+      const std::vector<int> ahead = starts_ahead(table);
+      roll_out(ahead, problem_.frames(), table);
     }
     state_.start_mse = std::move(table);
     std::vector<double> early(starts), full(starts);
@@ -130,6 +127,43 @@ class Fit {
     if (state_.candidates.empty()) problem_.refuse_starts();
     state_.stage = 0;
     checkpoint(0, true);
+  }
+
+  /// The losses of starts at the horizons up to `frames`, into [starts, stages].
+  void roll_out(const std::vector<int>& which, std::ptrdiff_t frames, std::vector<double>& table) {
+    constexpr std::size_t kBlock = 32;  // between two looks at the clock
+    for (std::size_t first = 0; first < which.size(); first += kBlock) {
+      const auto count = static_cast<int>(std::min(kBlock, which.size() - first));
+      kernels::for_each(count, [&](int k) {
+        const int i = which[first + k];
+        const auto mse = problem_.frame_mse(problem_.candidate(i), frames);
+        for (int s = 0; s < stages(); ++s) {
+          double& entry = table[i * stages() + s];
+          if (problem_.frames(s) <= frames)
+            entry = mean_of_first(mse, problem_.frames(s));
+          else if (!std::isfinite(mse.back()))
+            entry = kInfinity;  // what failed fails later on
+        }
+      });
+      show_progress(frames == problem_.frames(0) ? count : 0);
+    }
+  }
+
+  /// An eighth of the starts, or what the first stage takes twice, and the best of each material.
+  std::vector<int> starts_ahead(const std::vector<double>& table) const {
+    std::vector<int> order;
+    for (int i = 0; i < variables_.starts(); ++i) {
+      if (std::isfinite(table[i * stages()])) order.push_back(i);
+    }
+    std::stable_sort(order.begin(), order.end(),
+                     [&](int a, int b) { return table[a * stages()] < table[b * stages()]; });
+    const auto most = std::max<std::size_t>(order.size() / 8, 2 * options_.stages[0].candidates);
+    std::set<std::string> seen;
+    std::vector<int> ahead;
+    for (const int i : order) {
+      if (seen.insert(variables_.label(i)).second || ahead.size() < most) ahead.push_back(i);
+    }
+    return ahead;
   }
 
   void make_fits() {
@@ -268,7 +302,14 @@ class Fit {
     r.motion = problem_.motion(best);
     r.mse = best.mse;
     r.start = best.start;
+    for (const FitCandidate& c : state_.candidates) {
+      if (!std::isfinite(c.mse)) break;
+      FitEnd end{c.start, {}, problem_.motion(c)};
+      end.u.assign(c.u.data_ptr<double>(), c.u.data_ptr<double>() + c.u.numel());
+      r.ends.push_back(std::move(end));
+    }
     r.history = state_.history;
+    r.stages = stages();
     r.contact = problem_.contact();
     r.determined = r.contact < problem_.frames();
     for (int i = 0; i < variables_.starts(); ++i) {

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -37,6 +38,9 @@ struct FitOptions {
   std::vector<FitStage> stages;  ///< the last one has horizon 1
 };
 
+/// In the place of the error of a start that was behind at the first horizon already.
+inline constexpr double kNotRolledOut = std::numeric_limits<double>::max();
+
 /// A point that is being improved.
 struct FitCandidate {
   int start = 0;          ///< row of the starts
@@ -52,9 +56,17 @@ struct FitCandidate {
 struct FitState {
   int stage = -1;                 ///< −1: the starts are not ranked yet
   int steps = 0;                  ///< of the optimizers, done in this stage
-  std::vector<double> start_mse;  ///< [starts, stages] of every start at the stages' horizons
+  std::vector<double> start_mse;  ///< [starts, stages] of every start at the stages' horizons;
+                                  ///< infinite where it failed, or kNotRolledOut
   std::vector<FitCandidate> candidates;
   std::vector<FitRecord> history;
+};
+
+/// An end of a fit.
+struct FitEnd {
+  int start = 0;  ///< the start that it comes from
+  std::vector<double> u;
+  RigidMotion motion;  ///< initial velocity that was used
 };
 
 struct FitResult {
@@ -63,8 +75,11 @@ struct FitResult {
   RigidMotion motion;             ///< initial velocity that was used
   double mse = 0;                 ///< m², over all frames
   int start = 0;                  ///< the start that it comes from
-  std::vector<double> start_mse;  ///< [starts] over all frames, infinite where the roll-out failed
+  std::vector<double> start_mse;  ///< [starts] over all frames, infinite where the roll-out failed;
+                                  ///< or kNotRolledOut
   std::vector<FitRecord> history;
+  std::vector<FitEnd> ends;    ///< of the last stage, the best first, which is the result
+  int stages = 0;              ///< of the schedule; the last one sees all frames
   std::ptrdiff_t contact = 0;  ///< first frame at which a wall acts, see first_contact
   /// False where no wall acted, so that any law would have fitted, or where what was seen after it
   /// tells none of the numbers (FitPosterior::determined).
@@ -81,7 +96,8 @@ struct FitHooks {
 
 /// Algorithm 2: finds the law that makes a roll-out follow the observed positions.
 ///
-/// 1. Every start is rolled out once over all frames, which gives its loss at each horizon.
+/// 1. Every start is rolled out once up to the first horizon; the best eighth, and the best of each
+///    material, then over all frames.
 /// 2. The first stage begins with the best start of each material at the first horizon, the best
 ///    over all frames, and then the best that keep a distance from those chosen: one start that
 ///    fits the first moments may stand for the wrong kind of material and not leave it.

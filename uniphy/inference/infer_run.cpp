@@ -167,8 +167,7 @@ std::optional<std::size_t> roll_outs_to_a_hundredth(const FitResult& fit) {
   const double best_start = *std::min_element(fit.start_mse.begin(), fit.start_mse.end());
   for (std::size_t i = 0; i < fit.history.size(); ++i) {
     const FitRecord& r = fit.history[i];
-    const bool all_frames = r.stage == fit.history.back().stage;
-    if (all_frames && r.mse <= 0.01 * best_start) return i + 1;
+    if (r.stage + 1 == fit.stages && r.mse <= 0.01 * best_start) return i + 1;
   }
   return {};
 }

@@ -24,22 +24,29 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr std::array<double, LevenbergMarquardt::kTrials> kMultiples{1e-2, 1e-1, 1, 10};
 /// Share of the gain that the linear model predicts from which a step is as good as it says.
 constexpr double kGoodGain = 0.25;
-/// Share of a step at which the residuals show its curvature, and the longest acceleration over the
-/// step that is taken: beyond it the quadratic model says no more than the linear one (M. Transtrum
-/// and J. Sethna, arXiv:1201.5885: 0.1 and, of twice the acceleration, 0.75).
-constexpr double kProbe = 0.1, kMostBend = 0.375;
+/// Of what a trial has gained: the least that one more step of it gains, for another.
+constexpr double kWorthwhile = 0.1;
 /// How often the damping grows by kGrowth before a step is given up.
 constexpr int kRounds = 3;
 constexpr double kGrowth = 1e4;
 /// Beyond these a damping means no step, or none at all, to double precision.
 constexpr double kLeastDamping = 1e-12, kLargestDamping = 1e8;
-/// Of the largest curvature: what a direction that is hardly seen is damped by at least, so that it
-/// does not run away along differences that are rounding.
-constexpr double kFloor = 1e-6;
-
 using ConstVector = Eigen::Map<const Eigen::VectorXd>;
 
 ConstVector vector_of(const Tensor& t) { return {t.data_ptr<double>(), t.numel()}; }
+
+/// −(A + damping I)⁻¹ g.
+Eigen::VectorXd damped_step(Eigen::MatrixXd A, const Eigen::VectorXd& g, double damping) {
+  A.diagonal().array() += damping;
+  return -Eigen::LDLT<Eigen::MatrixXd>(A).solve(g);
+}
+
+/// Jᵀr in one order of summation on any number of threads.
+Eigen::VectorXd slope(const Eigen::MatrixXd& J, const Tensor& r) {
+  Eigen::VectorXd g(J.cols());
+  for (Eigen::Index i = 0; i < g.size(); ++i) g[i] = J.col(i).dot(vector_of(r));
+  return g;
+}
 
 Tensor moved(const Tensor& point, const Eigen::VectorXd& step) {
   Tensor result = point.clone();
@@ -92,6 +99,7 @@ Tensor LevenbergMarquardt::step(const Residuals& residuals) {
     loss_ = sum_of_squares(residuals_);
   }
   stuck_ = true;
+  gained_ = 0;
   if (std::isfinite(loss_) && loss_ > 0) {
     const Tensor here = point();
     std::vector<std::int64_t> columns(static_cast<std::size_t>(here.numel()));
@@ -99,12 +107,9 @@ Tensor LevenbergMarquardt::step(const Residuals& residuals) {
     const DifferenceJacobian slopes =
         difference_jacobian(residuals, here, residuals_, columns, options().difference());
     evaluations_ += slopes.evaluations;
-    const Eigen::MatrixXd& J = slopes.J;
-    const Eigen::MatrixXd A = normal_matrix(J);
-    Eigen::VectorXd g(J.cols());
-    for (Eigen::Index i = 0; i < g.size(); ++i) g[i] = J.col(i).dot(vector_of(residuals_));
-    const Trial best = best_trial(residuals, J, A, g);
+    const Trial best = best_trial(residuals, slopes.J);
     if (best.loss < loss_) {
+      gained_ = loss_ - best.loss;
       move_to(best.point);
       residuals_ = best.residuals;
       loss_ = best.loss;
@@ -115,11 +120,41 @@ Tensor LevenbergMarquardt::step(const Residuals& residuals) {
   return torch::scalar_tensor(loss_, torch::kFloat64);
 }
 
+LevenbergMarquardt::Trial LevenbergMarquardt::trial(const Residuals& residuals, Eigen::MatrixXd J,
+                                                    Eigen::MatrixXd A, double damping) const {
+  Trial best;
+  best.loss = kInfinity;
+  Tensor at = point(), r = residuals_;
+  double loss = loss_;
+  for (int k = 0; k < kTrialSteps; ++k) {
+    const Eigen::VectorXd g = slope(J, r);
+    const Eigen::VectorXd step = damped_step(A, g, damping);
+    if (k == 0) best.predicted = -(2 * g.dot(step) + step.dot(A * step));
+    if (!step.allFinite() || step.isZero(0)) break;
+    at = moved(at, step);
+    const Tensor next = residuals(at);
+    ++best.evaluations;
+    const double after = sum_of_squares(next);
+    if (after < best.loss) {
+      best.point = at;
+      best.residuals = next;
+      best.loss = after;
+    }
+    const bool off = k == 0 && std::isfinite(after) && !(after < loss);  // off the valley, perhaps
+    const bool worthwhile = loss - after > kWorthwhile * std::max(0.0, loss_ - after);
+    if (!off && !worthwhile) break;
+    const Eigen::VectorXd missed = vector_of(next) - vector_of(r) - J * step;
+    J += missed * (2 / step.squaredNorm() * step).transpose();
+    A = normal_matrix(J);
+    r = next;
+    loss = after;
+  }
+  return best;
+}
+
 LevenbergMarquardt::Trial LevenbergMarquardt::best_trial(const Residuals& residuals,
-                                                         const Eigen::MatrixXd& J,
-                                                         const Eigen::MatrixXd& A,
-                                                         const Eigen::VectorXd& g) {
-  const Tensor here = point();
+                                                         const Eigen::MatrixXd& J) {
+  const Eigen::MatrixXd A = normal_matrix(J);
   const double largest = A.diagonal().maxCoeff();
   Trial best;
   best.loss = kInfinity;
@@ -128,35 +163,12 @@ LevenbergMarquardt::Trial LevenbergMarquardt::best_trial(const Residuals& residu
     std::array<Trial, kTrials> trials;
     kernels::for_each(static_cast<std::ptrdiff_t>(trials.size()), [&](std::ptrdiff_t i) {
       const torch::NoGradGuard no_grad;
-      Trial& trial = trials[i];
-      trial.loss = kInfinity;
-      trial.damping = kMultiples[i] * damping_;
-      Eigen::MatrixXd damped = A;
-      damped.diagonal() += trial.damping * A.diagonal().cwiseMax(kFloor * largest);
-      const Eigen::LDLT<Eigen::MatrixXd> solver(damped);
-      const auto solved = [&](const Eigen::VectorXd& right) {
-        Eigen::VectorXd step = solver.solve(right);
-        for (Eigen::Index k = 0; k < step.size(); ++k) {
-          if (A(k, k) == 0) step[k] = 0;
-        }
-        return step;
-      };
-      Eigen::VectorXd step = solved(-g);
-      trial.predicted = -(2 * g.dot(step) + step.dot(A * step));
-      if (!step.allFinite()) return;
-      const Tensor ahead = residuals(moved(here, kProbe * step));
-      if (std::isfinite(sum_of_squares(ahead))) {
-        const Eigen::VectorXd curvature =
-            2 / kProbe * ((vector_of(ahead) - vector_of(residuals_)) / kProbe - J * step);
-        const Eigen::VectorXd bend = solved(-0.5 * (J.transpose() * curvature));
-        if (bend.norm() <= kMostBend * step.norm()) step += bend;
-      }
-      trial.point = moved(here, step);
-      trial.residuals = residuals(trial.point);
-      trial.loss = sum_of_squares(trial.residuals);
+      const double damping = kMultiples[i] * damping_;
+      trials[i] = trial(residuals, J, A, damping * largest);
+      trials[i].damping = damping;
     });
-    evaluations_ += kTrialEvaluations;
     for (const Trial& trial : trials) {
+      evaluations_ += trial.evaluations;
       if (trial.loss < best.loss) best = trial;
     }
     const auto good = std::find_if(trials.begin(), trials.end(), [&](const Trial& trial) {

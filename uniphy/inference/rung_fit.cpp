@@ -2,8 +2,10 @@
 
 #include <torch/torch.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <optional>
 
 namespace uniphy {
 namespace {
@@ -27,34 +29,42 @@ class Stopwatch {
 
 /// Share of the loss that an iteration has to take away.
 constexpr double kLittleGain = 0.01;
-/// A gain that noise tells from none, in residuals of the mean size.
-constexpr double kGainOverNoise = 10;
+/// A gain that noise tells from none, in residuals of the mean size: a fit that stops a few of them
+/// short has missed a good part of an interval.
+constexpr double kGainOverNoise = 1;
 
 }  // namespace
 
-Tensor least_squares(const FitProblem& problem, const Tensor& start, const Pull& pull,
-                     std::ptrdiff_t frames, int iterations, const StartCorrection* starts,
-                     RungTask& task, const AfterStep& after_step) {
+LeastSquaresEnd least_squares(const FitProblem& problem, const Tensor& start, const Pull& pull,
+                              std::ptrdiff_t frames, int iterations, const StartsAt& starts,
+                              double least_gain, RungTask& task, const AfterStep& after_step) {
   const Tensor leaf = start.detach().clone();
   LevenbergMarquardt optimizer({leaf}, LevenbergMarquardtOptions());
   if (task.steps > 0) optimizer.resume(task.optimizer);
+  std::optional<StartCorrection> correction;
   const auto residuals = [&](const Tensor& u) {
-    const Tensor r = problem.residuals(u, frames, starts);
+    const Tensor r = problem.residuals(u, frames, correction ? &*correction : nullptr);
     return r.defined() ? torch::cat({r, pull.weight * (u - pull.to)}) : r;
   };
   Stopwatch watch(task);
-  const double little = starts != nullptr ? kGainOverNoise / problem.seen(frames) : kLittleGain;
+  const double little =
+      std::max(least_gain, starts ? kGainOverNoise / problem.seen(frames) : kLittleGain);
   while (!task.done) {
-    const double before = optimizer.loss();
+    if (starts) {
+      correction = starts(optimizer.point());
+      optimizer.forget_residuals();
+    }
     const double loss = optimizer.step(residuals).item<double>();
     ++task.steps;
-    task.done = optimizer.stuck() || task.steps >= iterations || !(loss < (1 - little) * before);
+    const double gained = optimizer.gained();
+    task.done =
+        optimizer.stuck() || task.steps >= iterations || !(gained > little * (loss + gained));
     task.roll_outs = optimizer.evaluations();
     task.optimizer = optimizer.saved();
     watch.look();
     after_step(task, loss);
   }
-  return optimizer.point();
+  return {optimizer.point(), optimizer.loss()};
 }
 
 Tensor descend(const FitProblem& problem, const Tensor& start, const DescentOptions& options,

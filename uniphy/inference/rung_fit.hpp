@@ -3,6 +3,7 @@
 #include <torch/types.h>
 
 #include <functional>
+#include <optional>
 
 #include "uniphy/inference/adaptation_state.hpp"
 #include "uniphy/inference/descent.hpp"
@@ -21,13 +22,25 @@ struct Pull {
   torch::Tensor to, weight;
 };
 
+/// Where the points start by the flow at a point of a problem; nothing where the roll-out fails.
+using StartsAt = std::function<std::optional<StartCorrection>(const torch::Tensor& point)>;
+
+/// Where least squares ended.
+struct LeastSquaresEnd {
+  torch::Tensor point;
+  double loss = 0;  ///< of it, with the pull
+};
+
 /// The point of a problem's first `frames` that at most `iterations` of LevenbergMarquardt lead to
-/// from `start` (see FitProblem::residuals, also for `starts`); it ends sooner where an iteration
-/// gains less than 1 % of the loss, or, with `starts`, where noise is most of that, than ten
-/// residuals of the mean size. Goes on where the task was left.
-torch::Tensor least_squares(const FitProblem& problem, const torch::Tensor& start, const Pull& pull,
-                            std::ptrdiff_t frames, int iterations, const StartCorrection* starts,
-                            RungTask& task, const AfterStep& after_step);
+/// from `start` (see FitProblem::residuals). It ends sooner where an iteration gains less than 1 %
+/// of the loss. Where `starts` is not empty, those of the points are eliminated by the flow at
+/// each iteration's point, and as noise then is most of the loss, it ends where an iteration gains
+/// less than a residual of the mean size; either way at once where one gains less than the share
+/// `least_gain` of the loss. Goes on where the task was left.
+LeastSquaresEnd least_squares(const FitProblem& problem, const torch::Tensor& start,
+                              const Pull& pull, std::ptrdiff_t frames, int iterations,
+                              const StartsAt& starts, double least_gain, RungTask& task,
+                              const AfterStep& after_step);
 
 /// The lowest point of a Descent over all frames from `start`. Goes on where the task was left.
 torch::Tensor descend(const FitProblem& problem, const torch::Tensor& start,

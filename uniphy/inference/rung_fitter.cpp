@@ -65,11 +65,11 @@ RungReport& RungFitter::report(Rung rung) {
 }
 
 template <class Improve>
-Tensor RungFitter::work(Rung rung, const std::string& name, int steps, const Improve& improve) {
+auto RungFitter::work(Rung rung, const std::string& name, int steps, const Improve& improve) {
   RungTask& task = state_.task(fmt::format("{} {}", rung_name(rung), name));
   std::optional<Progress> progress;
   if (hooks_.progress && !task.done) progress.emplace(task.name, steps, "roll-outs");
-  const Tensor point = improve(task, [&](const RungTask& at, double loss) {
+  const auto result = improve(task, [&](const RungTask& at, double loss) {
     if (hooks_.on_record) {
       const int stage = static_cast<int>(options_.stages.size()) + static_cast<int>(rung);
       hooks_.on_record(
@@ -82,12 +82,14 @@ Tensor RungFitter::work(Rung rung, const std::string& name, int steps, const Imp
   });
   report(rung).roll_outs += task.roll_outs;
   report(rung).seconds += task.seconds;
-  return point;
+  return result;
 }
 
-Tensor RungFitter::least_squares(const Observation& seen, std::ptrdiff_t frames, Rung rung,
-                                 const Tensor& start, const Tensor& to, double pull,
-                                 const std::string& task, int iterations, bool with_motion) {
+LeastSquaresEnd RungFitter::least_squares(const Observation& seen, std::ptrdiff_t frames, Rung rung,
+                                          const Tensor& start, const Tensor& to, double pull,
+                                          const std::string& task, int iterations,
+                                          FitVelocity velocity, double least_gain) {
+  const bool with_motion = velocity != FitVelocity::no;
   const FitOptions options = rung_options(true);
   const FitVariables& variables = of(rung);
   const FitProblem problem(seen, name_, variables, options, &motion_);
@@ -98,16 +100,22 @@ Tensor RungFitter::least_squares(const Observation& seen, std::ptrdiff_t frames,
   if (with_motion) {
     all.to = torch::cat({to, problem.change_to(first_motion_.motion)});
     all.weight =
-        torch::cat({all.weight, motion_pull(problem, from, frames, starts ? &*starts : nullptr)});
+        torch::cat({all.weight, motion_pull(problem, from, frames, starts ? &*starts : nullptr,
+                                            velocity == FitVelocity::held)});
   }
   const int columns = static_cast<int>(from.numel());
   const int roll_outs = iterations * (columns + LevenbergMarquardt::kTrialEvaluations);
-  const Tensor point = work(rung, task, roll_outs, [&](RungTask& t, const AfterStep& after) {
-    return uniphy::least_squares(problem, from, all, frames, iterations,
-                                 starts ? &*starts : nullptr, t, after);
+  StartsAt renewed;
+  if (problem.fits_starts()) {
+    renewed = [&](const Tensor& point) { return starts_at(problem, point, frames); };
+  }
+  LeastSquaresEnd end = work(rung, task, roll_outs, [&](RungTask& t, const AfterStep& after) {
+    return uniphy::least_squares(problem, from, all, frames, iterations, renewed, least_gain, t,
+                                 after);
   });
-  if (with_motion) motion_ = problem.motion_at(point);
-  return point.slice(0, 0, variables.size()).clone();
+  if (with_motion) motion_ = problem.motion_at(end.point);
+  end.point = end.point.slice(0, 0, variables.size()).clone();
+  return end;
 }
 
 std::optional<StartCorrection> RungFitter::starts_at(const FitProblem& problem, const Tensor& point,
@@ -154,12 +162,16 @@ FitPosterior RungFitter::posterior(const Observation& seen, Rung rung, const Ten
 }
 
 Tensor RungFitter::motion_pull(const FitProblem& problem, const Tensor& point,
-                               std::ptrdiff_t frames, const StartCorrection* starts) const {
+                               std::ptrdiff_t frames, const StartCorrection* starts,
+                               bool held) const {
   const double noise = problem.noise_over_size();
-  const Tensor r = problem.residuals(point, frames, starts);
-  const double misfit = r.defined() ? r.square().sum().item<double>() : 0;
-  const double allowed = (starts != nullptr ? kNoiseAllowance : 2) * noise;
-  const double beside = std::max(0.0, misfit - allowed * allowed);
+  double beside = 0;
+  if (held) {
+    const Tensor r = problem.residuals(point, frames, starts);
+    const double misfit = r.defined() ? r.square().sum().item<double>() : 0;
+    const double allowed = (starts != nullptr ? kNoiseAllowance : 2) * noise;
+    beside = std::max(0.0, misfit - allowed * allowed);
+  }
   const double error = std::sqrt(noise * noise / problem.seen(frames) + beside);
   Tensor weight = torch::empty({FitProblem::kMotion}, torch::kFloat64);
   for (int k = 0; k < FitProblem::kMotion; ++k) {

@@ -14,6 +14,12 @@
 
 namespace uniphy {
 
+/// What least squares do with the initial velocity: leave it, fit it with what the first frames
+/// know of it by their noise, or hold it to that, too, as far as more than noise is missed. The
+/// last is for a law that is as near as it comes: of one on its way it would hold a velocity that
+/// is off.
+enum class FitVelocity { no, yes, held };
+
 /// The work of a ladder: fits points of its rungs to an observation or its first part, shows the
 /// progress, keeps the state on disk and counts what each rung cost.
 class RungFitter {
@@ -29,12 +35,13 @@ class RungFitter {
   /// The initial velocity of all roll-outs from now on.
   void set_motion(const RigidMotion& motion) { motion_ = motion; }
   const RigidMotion& motion() const { return motion_; }
-  /// The point that least squares on the first `frames` of `seen`, the observation or its first
-  /// part, lead to, pulled to `to` by `pull`; where asked for, with the initial velocity, which
-  /// then is that of all roll-outs. `task` is unique within the rung.
-  torch::Tensor least_squares(const Observation& seen, std::ptrdiff_t frames, Rung rung,
-                              const torch::Tensor& start, const torch::Tensor& to, double pull,
-                              const std::string& task, int iterations, bool with_motion);
+  /// Where least squares on the first `frames` of `seen`, the observation or its first part, end,
+  /// pulled to `to` by `pull`; where asked for, with the initial velocity, which then is that of
+  /// all roll-outs. `task` is unique within the rung; for `least_gain` see uniphy::least_squares.
+  LeastSquaresEnd least_squares(const Observation& seen, std::ptrdiff_t frames, Rung rung,
+                                const torch::Tensor& start, const torch::Tensor& to, double pull,
+                                const std::string& task, int iterations, FitVelocity velocity,
+                                double least_gain = 0);
   /// δ [points, 3] of the starts of `seen` by the law at a point (StartCorrection::correction).
   torch::Tensor start_shift(const Observation& seen, Rung rung, const torch::Tensor& point) const;
   /// The same of all weights, by at most `epochs` roll-outs with gradients over all frames.
@@ -60,15 +67,15 @@ class RungFitter {
   /// How strongly the initial velocity is pulled to the one of the first frames, [kMotion]: what
   /// that is known to against what a roll-out misses. Noise is independent from point to point;
   /// what the law, the grid or the time step leave beside it is one error that all share, so that
-  /// such a misfit does not move a velocity that is known.
+  /// such a misfit does not move a velocity that is held.
   torch::Tensor motion_pull(const FitProblem& problem, const torch::Tensor& point,
-                            std::ptrdiff_t frames, const StartCorrection* starts) const;
+                            std::ptrdiff_t frames, const StartCorrection* starts, bool held) const;
   /// Where the points start, by the flow at a point; nothing where that is known or the roll-out
   /// fails.
   std::optional<StartCorrection> starts_at(const FitProblem& problem, const torch::Tensor& point,
                                            std::ptrdiff_t frames) const;
   template <class Improve>
-  torch::Tensor work(Rung rung, const std::string& name, int steps, const Improve& improve);
+  auto work(Rung rung, const std::string& name, int steps, const Improve& improve);
 
   const Observation& observation_;
   const std::string& name_;

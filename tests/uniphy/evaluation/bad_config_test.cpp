@@ -38,9 +38,10 @@ TEST_P(BadEvaluation, IsRefused) {
 INSTANTIATE_TEST_SUITE_P(
     Evaluate, BadEvaluation,
     ::testing::Values(
-        BadConfig{"UnknownKind", evaluate_stage, "kind: rollout\n",
-                  "c.yaml:1: kind: expected one of trajectory, heldout, outside, open_world, found "
-                  "\"rollout\""},
+        BadConfig{
+            "UnknownKind", evaluate_stage, "kind: rollout\n",
+            "c.yaml:1: kind: expected one of trajectory, heldout, outside, open_world, materials, "
+            "found \"rollout\""},
         BadConfig{"NoTrajectory", evaluate_stage, "frames: all\n",
                   "c.yaml:1: trajectory: required key is missing, expected a file"},
         BadConfig{

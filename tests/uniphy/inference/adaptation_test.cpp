@@ -220,6 +220,29 @@ TEST(Adaptation, AnalyticLawsHaveNoRungs) {
   EXPECT_TRUE(found.rungs.empty());
 }
 
+/// Few frames of free flight know the velocity badly, and the noise of the first positions is that
+/// of the body: a velocity that is held while the law is far off ends with both off.
+TEST(Adaptation, ASoftBodyWithNoiseIsFoundDownToTheNoise) {
+  testing::ObservedScene scene;
+  scene.frames = 81;
+  scene.motion.centre[1] = 0.365;
+  Observation o = testing::observe(testing::elastic_body(6e3, 2e4), scene);
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> noise(0, 0.005 * scene.box);
+  for (double& x : o.x) x += noise(random);
+  const auto variables =
+      make_analytic_variables(kernels::LawId::elastic, {{1e3, 1e6}, {1e3, 1e6}}, 12, 1);
+  FitOptions options = schedule();
+  options.stages = {{0.25, 6, 8}, {0.5, 4, 8}, {1, 2, 20}};
+  AdaptationOptions adaptation = two_rungs();
+  adaptation.samples = 0;
+  const Adaptation found = adapt(o, "o", *variables, options, adaptation, quiet());
+  EXPECT_TRUE(found.starts_fitted);
+  EXPECT_LT(std::sqrt(found.fit.mse), 1.02 * 0.005 * scene.box);
+  EXPECT_NEAR(found.fit.law.mu, 6e3, 0.03 * 6e3);
+  EXPECT_NEAR(found.fit.law.lambda, 2e4, 0.1 * 2e4);
+}
+
 struct BadKey {
   const char* name;
   const char* yaml;

@@ -240,6 +240,25 @@ TEST(Fit, StartsCoverEveryMaterialAndKeepADistance) {
   EXPECT_THAT(choose_starts(*variables, early, full, 6), ::testing::ElementsAre(0));
 }
 
+TEST(Fit, OnlyStartsThatAreAheadAtTheFirstHorizonSeeAllFrames) {
+  Hidden hidden;
+  hidden.model = testing::readable_model(200);
+  const auto variables = make_latent_variables(hidden.model);
+  const FitResult r = fit_observation(hidden.observation, "o", *variables, schedule(), quiet());
+  ASSERT_EQ(r.start_mse.size(), 200u);
+  const auto skipped = std::count(r.start_mse.begin(), r.start_mse.end(), kNotRolledOut);
+  EXPECT_GT(skipped, 120);
+  EXPECT_LT(skipped, 190);
+  std::set<std::string> seen, all;
+  for (int i = 0; i < 200; ++i) {
+    all.insert(variables->label(i));
+    if (r.start_mse[i] < kNotRolledOut) seen.insert(variables->label(i));
+  }
+  EXPECT_EQ(seen, all);  // of each material one at least
+  EXPECT_EQ(r.ends.front().u, r.u);
+  EXPECT_EQ(r.ends.front().start, r.start);
+}
+
 TEST(Fit, HorizonsCountFromContact) {
   EXPECT_EQ(horizon_frames(1, 10, 41), 41);
   EXPECT_EQ(horizon_frames(0.5, 11, 41), 26);
@@ -262,9 +281,12 @@ TEST(Fit, PicturesAndMetricsOfAResult) {
   EXPECT_EQ(count.has_value(), metrics.find("roll_outs_to_a_hundredth").has_value());
   FitResult made;
   made.start_mse = {2e-4, 1e-4};
+  made.stages = 2;
   made.history = {{0, 1, 0, 0.1, 1e-9}, {1, 1, 0, 0.2, 2e-6}, {1, 1, 1, 0.2, 1e-6}};
   EXPECT_EQ(roll_outs_to_a_hundredth(made), 3u);  // the first stage does not see all frames
   made.history.pop_back();
+  EXPECT_FALSE(roll_outs_to_a_hundredth(made).has_value());
+  made.history.resize(1);  // the last stage did nothing
   EXPECT_FALSE(roll_outs_to_a_hundredth(made).has_value());
   EXPECT_EQ(*metrics.find("roll_outs"), static_cast<double>(inference.fit.history.size()));
   const Chart chart = loss_chart(inference.fit, *hidden.variables, "loss");

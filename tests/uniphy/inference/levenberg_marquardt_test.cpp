@@ -39,6 +39,39 @@ TEST(LevenbergMarquardt, ConvergesOnACurvedProblem) {
   EXPECT_NEAR(x[1].item<double>(), 1, 1e-6);
 }
 
+/// Its floor falls a thousandth as steeply as its sides rise, and no number lies along it.
+TEST(LevenbergMarquardt, FollowsALongCurvedValleyInFewJacobians) {
+  const auto valley = [](const Tensor& x) {
+    const Tensor along = (x[0] + x[1]) / std::sqrt(2.0), across = (x[0] - x[1]) / std::sqrt(2.0);
+    return torch::stack({1000 * (across - 0.5 * along.square()), along - 3});
+  };
+  const Tensor x = numbers({-1.0, -1.2});
+  LevenbergMarquardt optimizer({x}, LevenbergMarquardtOptions());
+  EXPECT_LT(steps_until_done(optimizer, valley), 30);
+  EXPECT_LT(optimizer.loss(), 1e-12);
+  EXPECT_NEAR((x[0] + x[1]).item<double>() / std::sqrt(2.0), 3, 1e-5);
+}
+
+TEST(LevenbergMarquardt, TellsWhatAStepGainedAndWhatItCost) {
+  const Tensor x = numbers({3.0, 0.1});
+  LevenbergMarquardt optimizer({x}, LevenbergMarquardtOptions());
+  int calls = 0;
+  const auto counted = [&](const Tensor& u) {
+    ++calls;
+    return curved(u);
+  };
+  testing::on_threads(1, [&] {
+    const double first = sum_of_squares(curved(x));
+    optimizer.step(counted);
+    EXPECT_NEAR(optimizer.gained(), first - optimizer.loss(), 1e-9 * first);
+    const double before = optimizer.loss();
+    optimizer.step(counted);
+    EXPECT_NEAR(optimizer.gained(), before - optimizer.loss(), 1e-9 * before);
+    return 0;
+  });
+  EXPECT_EQ(optimizer.evaluations(), calls);
+}
+
 TEST(LevenbergMarquardt, EndsWhereTheGradientOfALinearProblemVanishes) {
   const Tensor A = numbers({1, 2, 3, 4, 5, 6.5, 7, 8, -9, 1, 0, 2}).view({4, 3});
   const Tensor b = numbers({1, -2, 0.5, 3}), x = numbers({0, 0, 0});
@@ -73,8 +106,9 @@ TEST(LevenbergMarquardt, WhereThereAreNoResidualsNoStepEnds) {
   // At the edge, where the step forwards has none, the one backwards gives the column.
   const Tensor edge = numbers({2.1, 1});
   LevenbergMarquardt from_edge({edge}, LevenbergMarquardtOptions());
-  from_edge.step([](const Tensor& y) { return y[0].item<double>() > 2.1 ? Tensor() : curved(y); });
-  EXPECT_LT(edge[0].item<double>(), 2.05);
+  steps_until_done(
+      from_edge, [](const Tensor& y) { return y[0].item<double>() > 2.1 ? Tensor() : curved(y); });
+  EXPECT_NEAR(edge[0].item<double>(), 2, 1e-6);
 }
 
 TEST(LevenbergMarquardt, WithoutResidualsAtTheStartItIsStuck) {
