@@ -13,7 +13,7 @@ namespace uniphy {
 struct Identified {
   std::string material, shape, other_shape;
   double fit_mse = 0, fit_share = 0;      ///< m², and its root over the largest side
-  double other_best = 0;                  ///< m², best code of other materials, of those rolled out whole
+  double other_best = 0;                  ///< m², best of the codes of others that were rolled out
   double resim_mse = 0, resim_share = 0;  ///< NaN where the re-simulation failed
   bool beats_other = false;
   std::string nearest;  ///< material of the nearest training code
