@@ -9,6 +9,7 @@
 #include <limits>
 #include <map>
 
+#include "ops/kernels/base/error.hpp"
 #include "uniphy/inference/candidate_fit.hpp"
 #include "uniphy/inference/misfit.hpp"
 #include "uniphy/inference/observed_noise.hpp"
@@ -167,8 +168,7 @@ class Ladder {
       if (settled) break;
     }
     explained_ = std::sqrt(loss) <= enough_;
-    if (fits_starts_ &&
-        !explained_) {  // by a law beside the family, or a grid: not by the velocity
+    if (fits_starts_ && !explained_) {  // what is left is of the law or the grid
       c.point =
           fitter_
               .least_squares(part_, part_.frames, Rung::latent, c.point, c.point, least_pull(),
@@ -234,8 +234,11 @@ class Ladder {
     r.end.motion = fitter_.motion();
     r.loss = to.loss;
     if (!std::isfinite(r.loss)) return;
-    const Tensor shift = fitter_.start_shift(first_frames(r.seen, frames), Rung::latent, to.point);
-    r.seen = with_corrected_starts(r.seen, shift);
+    try {
+      const Observation part = first_frames(r.seen, frames);
+      r.seen = with_corrected_starts(r.seen, fitter_.start_shift(part, Rung::latent, to.point));
+    } catch (const Error&) {  // points leave the grid with this law: it keeps its starts
+    }
   }
 
   /// The starts of its points are those of all that is fitted from now on.
