@@ -100,6 +100,7 @@ DrawnMotion draw_motion(const MaterialsOptions& o, std::int64_t trajectory) {
       const auto F = make_motion_objective(motion.whole, steps, grid, "float64")
                          ->deformations(setup.law(), start, motion.whole.frames);
       motion.truth = read_material(setup.law(), grid.dt, strain_seen(F));
+      motion.truth.cohesion = MaterialReading::kNone;  // of none of the families
       return motion;
     } catch (const Error&) {
       if (attempt + 1 >= o.draw.attempts) throw;
