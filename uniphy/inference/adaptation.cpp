@@ -9,7 +9,7 @@
 #include <limits>
 #include <map>
 
-#include "ops/kernels/base/error.hpp"
+#include "uniphy/inference/best_end.hpp"
 #include "uniphy/inference/candidate_fit.hpp"
 #include "uniphy/inference/misfit.hpp"
 #include "uniphy/inference/observed_noise.hpp"
@@ -26,15 +26,6 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// Iterations at each horizon that show which start is worth going on with: of water and jelly,
 /// begun from codes of other materials, the right ones are ahead after three.
 constexpr int kTrialIterations = 4;
-/// Ends of the fit by gradients that least squares go on from where the starts of noisy points are
-/// fitted, too; iterations of each at a horizon, and of the better half after those. A law that is
-/// not settled at one horizon may be too far off for the next: elastic cubes ended at 0.7 of lambda
-/// in a basin that nothing led out of.
-constexpr int kEnds = 4;
-constexpr int kEndIterations = 2;
-constexpr int kEndIterationsAhead = 4;
-/// Share of the loss that one of these has to take away for another.
-constexpr double kEndGain = 0.01;
 /// Fits of z between which the starts of noisy points are moved to where the last one has them: the
 /// flow that says where is that of the fit before.
 constexpr int kStartRounds = 6;
@@ -129,7 +120,8 @@ class Ladder {
   Climber fit_latent() {
     RungTask& task = fitter_.state().task("latent");
     const auto begin = std::chrono::steady_clock::now();
-    result_.fit = fit_observation(part_, name_, latent_, latent_options(), hooks_);
+    result_.fit = fit_observation(part_, name_, latent_,
+                                  fits_starts_ ? schedule_to_ends(options_) : options_, hooks_);
     const std::chrono::duration<double> time = std::chrono::steady_clock::now() - begin;
     if (!task.done) {
       task.seconds = time.count();
@@ -141,7 +133,13 @@ class Ladder {
     fitter_.report(Rung::latent).seconds += task.seconds;
     const bool converged = options_.stages.back().optimizer == kLevenbergMarquardt;
     const int rounds = fits_starts_ ? kStartRounds : converged ? 0 : 1;
-    const FitEnd end = fits_starts_ ? best_end() : result_.fit.ends.front();
+    FitEnd end = result_.fit.ends.front();
+    if (fits_starts_) {
+      const SettledEnd best =
+          best_end(fitter_, part_, result_.fit.ends, fitted_horizons(), least_pull());
+      end = best.end;
+      take_starts(best.seen);
+    }
     fitter_.set_motion(end.motion);
     result_.fit.start = end.start;
     Climber c{latent_.label(end.start), to_tensor(end.u), {}};
@@ -178,67 +176,6 @@ class Ladder {
     }
     conclude(c, Rung::latent);
     return c;
-  }
-
-  /// Of noisy points gradients see errors of the starts as if they were of the law, the more the
-  /// longer the roll-out: over all frames least squares do better from where the stage before ends.
-  FitOptions latent_options() const {
-    FitOptions options = options_;
-    if (fits_starts_ && options.stages.size() > 1) {
-      options.stages.back().epochs = 0;
-      options.stages.back().candidates = std::min(kEnds, (options.stages.end() - 2)->candidates);
-    }
-    return options;
-  }
-
-  /// An end of the fit by gradients on its way.
-  struct Runner {
-    FitEnd end;
-    std::size_t number;
-    Observation seen;  ///< the part that is fitted, with the starts that this law has found
-    double loss = kInfinity;
-  };
-
-  /// The end of the fit by gradients that least squares get furthest from: at growing horizons, of
-  /// which each leaves the better half.
-  FitEnd best_end() {
-    std::vector<Runner> runners;
-    for (const FitEnd& end : result_.fit.ends) runners.push_back({end, runners.size() + 1, part_});
-    std::vector<std::ptrdiff_t> horizons;
-    for (const FitStage& stage : options_.stages)
-      horizons.push_back(horizon_frames(stage.horizon, result_.fit.contact, part_.frames));
-    std::sort(horizons.begin(), horizons.end());
-    for (std::size_t s = 0; s < horizons.size() && runners.size() > 1; ++s) {
-      const auto all_run = [&](const char* name, int iterations) {
-        for (Runner& r : runners)
-          run(r, horizons[s], fmt::format("{} {}, horizon {}", name, r.number, s + 1), iterations);
-      };
-      all_run("end", kEndIterations);
-      std::stable_sort(runners.begin(), runners.end(),
-                       [](const Runner& a, const Runner& b) { return a.loss < b.loss; });
-      runners.erase(runners.begin() + static_cast<std::ptrdiff_t>((runners.size() + 1) / 2),
-                    runners.end());
-      if (horizons[s] < part_.frames) all_run("better end", kEndIterationsAhead);
-    }
-    take_starts(runners.front().seen);
-    return runners.front().end;
-  }
-
-  void run(Runner& r, std::ptrdiff_t frames, const std::string& task, int iterations) {
-    const Tensor from = to_tensor(r.end.u);
-    fitter_.set_motion(r.end.motion);
-    const LeastSquaresEnd to =
-        fitter_.least_squares(r.seen, frames, Rung::latent, from, from, least_pull(), task,
-                              iterations, FitVelocity::yes, kEndGain);
-    r.end.u.assign(to.point.data_ptr<double>(), to.point.data_ptr<double>() + to.point.numel());
-    r.end.motion = fitter_.motion();
-    r.loss = to.loss;
-    if (!std::isfinite(r.loss)) return;
-    try {
-      const Observation part = first_frames(r.seen, frames);
-      r.seen = with_corrected_starts(r.seen, fitter_.start_shift(part, Rung::latent, to.point));
-    } catch (const Error&) {  // points leave the grid with this law: it keeps its starts
-    }
   }
 
   /// The starts of its points are those of all that is fitted from now on.
@@ -311,14 +248,21 @@ class Ladder {
     return climbers;
   }
 
-  /// Frames of the horizons of the schedule, growing, and all of the observation.
-  std::vector<std::ptrdiff_t> growing_horizons() const {
-    std::vector<std::ptrdiff_t> frames{observation_.frames};
+  /// Frames of the horizons of the schedule, growing.
+  std::vector<std::ptrdiff_t> fitted_horizons() const {
+    std::vector<std::ptrdiff_t> frames;
     for (const FitStage& stage : options_.stages) {
       frames.push_back(horizon_frames(stage.horizon, result_.fit.contact, part_.frames));
     }
     std::sort(frames.begin(), frames.end());
     frames.erase(std::unique(frames.begin(), frames.end()), frames.end());
+    return frames;
+  }
+
+  /// The same, and all of the observation.
+  std::vector<std::ptrdiff_t> growing_horizons() const {
+    std::vector<std::ptrdiff_t> frames = fitted_horizons();
+    if (frames.back() < observation_.frames) frames.push_back(observation_.frames);
     return frames;
   }
 

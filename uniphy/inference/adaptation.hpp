@@ -67,7 +67,7 @@ struct Adaptation {
 /// roll-out: there they end before the last stage, and least squares go on from several of their
 /// ends, over the horizons of the schedule, of which each leaves the better half. The velocity then
 /// is known to what the noise of the first frames leaves of it, and is held to them only where the
-/// best law misses more than noise (FitVelocity).
+/// best law misses more than noise (best_end, FitVelocity).
 ///
 /// Analytic variables have no rung but `latent`; where that is the only one, all frames are fitted.
 /// Without a contact it is fit_observation alone. Resumes like it, with adaptation_state_file()

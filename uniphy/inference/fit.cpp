@@ -111,10 +111,8 @@ class Fit {
     std::vector<int> all(starts);
     std::iota(all.begin(), all.end(), 0);
     roll_out(all, problem_.frames(0), table);
-    if (stages() > 1) {
-      const std::vector<int> ahead = starts_ahead(table);
-      roll_out(ahead, problem_.frames(), table);
-    }
+    if (problem_.frames(0) < problem_.frames())
+      roll_out(starts_ahead(table), problem_.frames(), table);
     state_.start_mse = std::move(table);
     std::vector<double> early(starts), full(starts);
     for (int i = 0; i < starts; ++i) {

@@ -31,6 +31,7 @@ constexpr int kRounds = 3;
 constexpr double kGrowth = 1e4;
 /// Beyond these a damping means no step, or none at all, to double precision.
 constexpr double kLeastDamping = 1e-12, kLargestDamping = 1e8;
+
 using ConstVector = Eigen::Map<const Eigen::VectorXd>;
 
 ConstVector vector_of(const Tensor& t) { return {t.data_ptr<double>(), t.numel()}; }

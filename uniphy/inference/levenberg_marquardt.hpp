@@ -34,9 +34,9 @@ struct LevenbergMarquardtOptions
 /// that step δ has shown: J + 2 (r(u + δ) − r(u) − J δ) δᵀ/δᵀδ, whose slope along δ is that of the
 /// parabola through the step where it ends (without the 2, the slope of its chord, it is C.
 /// Broyden's update, Math. Comp. 19, 1965). Along a curved valley the first step leaves it and the
-/// next ones return to it. The least λ is taken whose end is lower by a quarter of
-/// what the linear model says of the first step (J. Moré, 1978), else that of the lowest end; there
-/// the next step looks. Where none is lower, λ grows.
+/// next ones return to it. The least λ is taken whose end is lower by a quarter of what the
+/// linear model says of the first step (J. Moré, 1978), else that of the lowest end; there the next
+/// step looks. Where none is lower, λ grows.
 ///
 /// A number that moves nothing (a column of zeros) stays where it is. Evaluations run side by side
 /// (kernels::for_each); sums have one order, so that results have the same bits on any number of

@@ -95,13 +95,11 @@ LeastSquaresEnd RungFitter::least_squares(const Observation& seen, std::ptrdiff_
   const FitProblem problem(seen, name_, variables, options, &motion_);
   const Tensor still = torch::zeros({with_motion ? FitProblem::kMotion : 0}, torch::kFloat64);
   const Tensor from = torch::cat({start, still});
-  const std::optional<StartCorrection> starts = starts_at(problem, from, frames);
   Pull all{to, torch::full_like(to, pull)};
   if (with_motion) {
     all.to = torch::cat({to, problem.change_to(first_motion_.motion)});
-    all.weight =
-        torch::cat({all.weight, motion_pull(problem, from, frames, starts ? &*starts : nullptr,
-                                            velocity == FitVelocity::held)});
+    const Tensor weight = motion_pull(problem, from, frames, velocity == FitVelocity::held);
+    all.weight = torch::cat({all.weight, weight});
   }
   const int columns = static_cast<int>(from.numel());
   const int roll_outs = iterations * (columns + LevenbergMarquardt::kTrialEvaluations);
@@ -162,14 +160,14 @@ FitPosterior RungFitter::posterior(const Observation& seen, Rung rung, const Ten
 }
 
 Tensor RungFitter::motion_pull(const FitProblem& problem, const Tensor& point,
-                               std::ptrdiff_t frames, const StartCorrection* starts,
-                               bool held) const {
+                               std::ptrdiff_t frames, bool held) const {
   const double noise = problem.noise_over_size();
   double beside = 0;
   if (held) {
-    const Tensor r = problem.residuals(point, frames, starts);
+    const std::optional<StartCorrection> starts = starts_at(problem, point, frames);
+    const Tensor r = problem.residuals(point, frames, starts ? &*starts : nullptr);
     const double misfit = r.defined() ? r.square().sum().item<double>() : 0;
-    const double allowed = (starts != nullptr ? kNoiseAllowance : 2) * noise;
+    const double allowed = (starts ? kNoiseAllowance : 2) * noise;
     beside = std::max(0.0, misfit - allowed * allowed);
   }
   const double error = std::sqrt(noise * noise / problem.seen(frames) + beside);

@@ -69,7 +69,7 @@ class RungFitter {
   /// what the law, the grid or the time step leave beside it is one error that all share, so that
   /// such a misfit does not move a velocity that is held.
   torch::Tensor motion_pull(const FitProblem& problem, const torch::Tensor& point,
-                            std::ptrdiff_t frames, const StartCorrection* starts, bool held) const;
+                            std::ptrdiff_t frames, bool held) const;
   /// Where the points start, by the flow at a point; nothing where that is known or the roll-out
   /// fails.
   std::optional<StartCorrection> starts_at(const FitProblem& problem, const torch::Tensor& point,
