@@ -40,6 +40,9 @@ int main(int argc, char** argv) {
         view.hidden = points.real("hidden", 0, between(0, 0.99), "",
                                   "share of their positions that is hidden, drawn");
         uniphy::Section frames = config.section("frames", "when they are seen");
+        view.first = frames.integer("first", 0, between(0, 1e9), "",
+                                    "number of the first one; where the body is deformed in it, "
+                                    "start_degree of uniphy_infer says so");
         view.stride = frames.integer("stride", 1, between(1, 1000000), "", "every so many");
         view.last =
             frames.integer("last", -1, between(-1, 1e9), "", "number of the last one; -1: all");

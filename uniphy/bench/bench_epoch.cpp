@@ -171,7 +171,7 @@ void bench_epoch(const BenchOptions& options, int threads, BenchReport& report) 
     body.parameters.requires_grad_();
     const auto epoch = [&] {
       body.parameters.mutable_grad() = Tensor();
-      objective->mse(body, v0, observation.frames).backward();
+      objective->mse(body, {v0}, observation.frames).backward();
       if (!body.parameters.grad().isfinite().all().item<bool>()) {
         throw Error("bench: the gradient of an epoch with random weights is not finite");
       }

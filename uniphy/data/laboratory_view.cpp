@@ -47,13 +47,31 @@ double size_of(const std::vector<double>& start) {
   return size;
 }
 
+std::vector<double> frame_of(const Observation& o, std::int64_t frame) {
+  return {o.positions(frame), o.positions(frame) + 3 * o.points()};
+}
+
+/// Whether the points of a frame are all particles of the body.
+bool shows_body(const Observation& o, std::int64_t frame) {
+  const std::vector<double> x = frame_of(o, frame);
+  return !o.tracked() && std::none_of(x.begin(), x.end(), [](double c) { return std::isnan(c); });
+}
+
 }  // namespace
 
 Observation laboratory_view(const Observation& whole, const LaboratoryView& view) {
   const std::int64_t last = view.last < 0 ? whole.frames - 1 : view.last;
-  if (last >= whole.frames || view.stride > last) {
-    throw Error(fmt::format("frames: expected at least two of 0 to {}, found every {}th up to {}",
-                            whole.frames - 1, view.stride, last));
+  if (last >= whole.frames || view.first + view.stride > last) {
+    throw Error(
+        fmt::format("frames: expected at least two of 0 to {}, found every {}th from {} to "
+                    "{}",
+                    whole.frames - 1, view.stride, view.first, last));
+  }
+  if (view.first > 0 && !shows_body(whole, view.first)) {
+    throw Error(
+        fmt::format("frames.first: expected all particles of the body in frame {}, found an "
+                    "observation that does not have them there",
+                    view.first));
   }
   const std::int64_t points = whole.points();
   const auto count = static_cast<std::int64_t>(std::llround(view.share * double(points)));
@@ -67,10 +85,10 @@ Observation laboratory_view(const Observation& whole, const LaboratoryView& view
   o.x.clear();
   o.time.clear();
   o.frames = 0;
-  if (whole.vertices.empty()) o.body = whole.start();
+  if (whole.vertices.empty()) o.body = view.first > 0 ? frame_of(whole, view.first) : whole.start();
   const double size = size_of(whole.vertices.empty() ? whole.start() : whole.vertices);
   const double noise = view.noise * size;
-  for (std::int64_t f = 0; f <= last; f += view.stride) {
+  for (std::int64_t f = view.first; f <= last; f += view.stride) {
     for (const std::int64_t p : kept) {
       const bool hidden = random.unit() < view.hidden;
       for (int k = 0; k < 3; ++k) {

@@ -8,7 +8,8 @@ namespace uniphy {
 
 /// What a laboratory sees of a motion that is known in full.
 struct LaboratoryView {
-  double share = 1;         ///< of the points that is tracked, drawn from the seed, (0, 1]
+  double share = 1;        ///< of the points that is tracked, drawn from the seed, (0, 1]
+  std::int64_t first = 0;  ///< frame that begins the observation, at which the body may be deformed
   std::int64_t stride = 1;  ///< of the frames, the first one is kept
   std::int64_t last = -1;   ///< frame that ends the observation; −1: the last one
   double noise = 0;         ///< standard deviation of a coordinate over the size of the body
@@ -19,8 +20,9 @@ struct LaboratoryView {
 
 /// Where all particles are seen in all frames, they are the points still (version 1). Else the
 /// points are tracers, and the body stands beside them as the first frame has it, free of noise.
-/// Positions that noise drives out of the unit cube stay on its side. Throws Error where fewer than
-/// two frames or no point is left.
+/// A body that is a surface, or whose points are tracers, is not known at a later frame. Positions
+/// that noise drives out of the unit cube stay on its side. Throws Error where fewer than two
+/// frames or no point is left.
 Observation laboratory_view(const Observation& whole, const LaboratoryView& view);
 
 }  // namespace uniphy

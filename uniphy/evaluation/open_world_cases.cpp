@@ -9,6 +9,8 @@
 namespace uniphy {
 namespace {
 
+constexpr int kDeformedAfter = 5;   ///< the part of the frames that `deformed` leaves out
+constexpr int kDeformedDegree = 2;  ///< Observation::start_degree
 constexpr int kFiner = 2;  ///< grid and particles along a side; the step is its square finer
 
 /// The scene with a lattice twice as fine, on a grid twice as fine, the walls at their place.
@@ -74,7 +76,8 @@ RigidMotion initial_motion(const OutsideScene& scene, const Observation& seen) {
 LaboratoryView view_of(OpenWorldCase c, double noise, std::uint64_t seed) {
   LaboratoryView view;
   view.seed = seed;
-  if (c == OpenWorldCase::closed || c == OpenWorldCase::finer) return view;
+  if (c == OpenWorldCase::closed || c == OpenWorldCase::finer || c == OpenWorldCase::deformed)
+    return view;
   view.noise = noise;
   if (c == OpenWorldCase::noise) {
     view.says_noise = false;  // it can be estimated
@@ -94,11 +97,16 @@ OpenWorldMotion open_world_motion(const OutsideScene& scene, const kernels::LawD
   moved.scene.bodies.front().law = law;
   const Observation whole =
       c == OpenWorldCase::finer ? observe_finer(moved, law) : observe(moved, law);
-  const LaboratoryView view = view_of(c, noise, seed);
+  LaboratoryView view = view_of(c, noise, seed);
   OpenWorldMotion result;
+  if (c == OpenWorldCase::deformed) view.first = whole.frames / kDeformedAfter;
   result.motion.seen = laboratory_view(whole, view);
   result.motion.name =
       fmt::format("{} in {}, {}", kernels::law_name(law.id), scene.name, case_name(c));
+  if (c == OpenWorldCase::deformed) {  // in its own state the true law is exact
+    result.motion.seen.start_degree = kDeformedDegree;
+    return result;
+  }
   for (std::int64_t f = 0; f < whole.frames; f += view.stride) {
     const double* x = whole.positions(f);
     result.motion.truth.insert(result.motion.truth.end(), x, x + 3 * whole.particles);

@@ -15,18 +15,21 @@ enum class OpenWorldCase {
   noise,    ///< the same with noise
   tracked,  ///< a tenth of the particles as tracked points, every tenth frame, with noise
   hidden,   ///< the same, and a third of their positions hidden
-  finer     ///< all particles, from a grid twice as fine with a quarter of the time step and eight
+  finer,    ///< all particles, from a grid twice as fine with a quarter of the time step and eight
             ///< times the particles, of which means of 2×2×2 are seen; a cube alone
+  deformed  ///< all particles, from a fifth of the time on, at which the body has met the floor;
+            ///< its state there is fitted as polynomials of degree 2
 };
-inline constexpr const char* kOpenWorldCases[] = {"closed", "noise", "tracked", "hidden", "finer"};
+inline constexpr const char* kOpenWorldCases[] = {"closed", "noise", "tracked",
+                                                  "hidden", "finer", "deformed"};
 const char* case_name(OpenWorldCase c);
 /// How a laboratory sees a motion in a case; noise: standard deviation of a coordinate over the
-/// size of the body. Of `finer`, the view of the closed world.
+/// size of the body. Of `finer` and `deformed`, the view of the closed world.
 LaboratoryView view_of(OpenWorldCase c, double noise, std::uint64_t seed);
 
 struct OpenWorldMotion {
   JudgedMotion motion;
-  double floor = 0;  ///< forecast_error of the true law with the true initial velocity
+  double floor = 0;  ///< forecast_error of the true law with the true initial state
 };
 
 /// The law's motion in a scene as a case has it; noise: standard deviation of a coordinate over the

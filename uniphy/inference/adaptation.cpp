@@ -70,6 +70,8 @@ class Ladder {
         hooks_(hooks),
         fitted_frames_(fitted_frames),
         fits_starts_(fits_starts),
+        deformed_(observation.start_degree > 0),
+        from_ends_(fits_starts_ || deformed_),
         fitter_(observation_, name, latent, options, adaptation, hooks),
         noise_(observed_noise(observation) / fitter_.size()),
         enough_(std::hypot(adaptation.enough, (fits_starts ? kNoiseAllowance : 2) * noise_)) {}
@@ -120,8 +122,7 @@ class Ladder {
   Climber fit_latent() {
     RungTask& task = fitter_.state().task("latent");
     const auto begin = std::chrono::steady_clock::now();
-    result_.fit = fit_observation(part_, name_, latent_,
-                                  fits_starts_ ? schedule_to_ends(options_) : options_, hooks_);
+    result_.fit = fit_observation(part_, name_, latent_, schedule(), hooks_);
     const std::chrono::duration<double> time = std::chrono::steady_clock::now() - begin;
     if (!task.done) {
       task.seconds = time.count();
@@ -132,11 +133,11 @@ class Ladder {
     fitter_.report(Rung::latent).roll_outs += task.roll_outs;
     fitter_.report(Rung::latent).seconds += task.seconds;
     const bool converged = options_.stages.back().optimizer == kLevenbergMarquardt;
-    const int rounds = fits_starts_ ? kStartRounds : converged ? 0 : 1;
+    const int rounds = from_ends_ ? kStartRounds : converged ? 0 : 1;
     FitEnd end = result_.fit.ends.front();
-    if (fits_starts_) {
+    if (from_ends_) {
       const SettledEnd best =
-          best_end(fitter_, part_, result_.fit.ends, fitted_horizons(), least_pull());
+          best_end(fitter_, part_, result_.fit.ends, fitted_horizons(), least_pull(), fits_starts_);
       end = best.end;
       take_starts(best.seen);
     }
@@ -147,11 +148,11 @@ class Ladder {
     Observation before = part_;  // the last one whose starts were moved
     for (int round = 0; round < rounds; ++round) {
       const std::string name = round == 0 ? "code" : fmt::format("code, round {}", round + 1);
-      const RigidMotion motion = fitter_.motion();
+      const InitialState motion = fitter_.motion();
       const LeastSquaresEnd to =
           fitter_.least_squares(part_, part_.frames, Rung::latent, c.point, c.point, least_pull(),
                                 name, round == 0 ? adaptation_.iterations : kRoundIterations,
-                                fits_starts_ ? FitVelocity::yes : FitVelocity::held);
+                                from_ends_ ? FitVelocity::yes : FitVelocity::held);
       if (round > 0 && !(to.loss < loss)) {  // the starts moved too far
         fitter_.set_motion(motion);
         take_starts(before);
@@ -160,13 +161,15 @@ class Ladder {
       c.point = to.point;
       const bool settled = !(to.loss < (1 - kRoundGain) * loss);
       loss = to.loss;
-      if (!fits_starts_) break;
-      before = part_;
-      move_starts(Rung::latent, c.point, part_);
+      if (!from_ends_) break;
+      if (fits_starts_) {
+        before = part_;
+        move_starts(Rung::latent, c.point, part_);
+      }
       if (settled) break;
     }
     explained_ = std::sqrt(loss) <= enough_;
-    if (fits_starts_ && !explained_) {  // what is left is of the law or the grid
+    if (fits_starts_ && !explained_ && !deformed_) {  // what is left is of the law or the grid
       c.point =
           fitter_
               .least_squares(part_, part_.frames, Rung::latent, c.point, c.point, least_pull(),
@@ -176,6 +179,11 @@ class Ladder {
     }
     conclude(c, Rung::latent);
     return c;
+  }
+
+  FitOptions schedule() const {
+    if (deformed_) return schedule_of_starts(options_);
+    return fits_starts_ ? schedule_to_ends(options_) : options_;
   }
 
   /// The starts of its points are those of all that is fitted from now on.
@@ -315,7 +323,7 @@ class Ladder {
   void finish(const Climber& best) {
     const std::string task = "all frames";
     const Rung rung = result_.rung;
-    const RigidMotion before = fitter_.motion();
+    const InitialState before = fitter_.motion();
     Climber last = best;
     last.point =
         rung == Rung::weights
@@ -355,6 +363,8 @@ class Ladder {
   const FitHooks& hooks_;
   const std::ptrdiff_t fitted_frames_;
   const bool fits_starts_;
+  const bool deformed_;   ///< at the first frame
+  const bool from_ends_;  ///< of gradients, least squares race: best_end
   RungFitter fitter_;
   double noise_, enough_;   ///< over size
   bool explained_ = false;  ///< by z alone, what is fitted of the observation
@@ -369,7 +379,8 @@ Adaptation adapt(const Observation& observation, const std::string& name,
   const FitProblem problem(observation, name, variables, options);
   const std::ptrdiff_t frames = observation.frames, contact = problem.contact();
   std::ptrdiff_t fitted = frames;
-  if (adaptation.rungs.size() > 1 && can_be_adapted(variables)) {
+  const bool deformed = observation.start_degree > 0;  // what is left is its start's: no more laws
+  if (adaptation.rungs.size() > 1 && can_be_adapted(variables) && !deformed) {
     fitted = std::min(horizon_frames(1 - adaptation.kept, contact, frames), frames - 1);
   }
   const bool climbs = fitted < frames && contact < fitted;

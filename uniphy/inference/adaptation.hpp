@@ -69,6 +69,10 @@ struct Adaptation {
 /// is known to what the noise of the first frames leaves of it, and is held to them only where the
 /// best law misses more than noise (best_end, FitVelocity).
 ///
+/// Where the body is deformed at the first frame (Observation::start_degree), its velocity and
+/// stretch there are fitted with z from the best starts of each material, which race in the same
+/// way; the law is not adapted then, since what is left is of the polynomials.
+///
 /// Analytic variables have no rung but `latent`; where that is the only one, all frames are fitted.
 /// Without a contact it is fit_observation alone. Resumes like it, with adaptation_state_file()
 /// beside its state file. Results have the same bits on any number of threads. hooks.on_record is

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <vector>
 
 #include "ops/kernels/base/for_each.hpp"
 
@@ -48,11 +49,17 @@ DifferenceJacobian difference_jacobian(const Residuals& residuals, const Tensor&
 }
 
 Eigen::MatrixXd normal_matrix(const Eigen::MatrixXd& J) {
-  const Eigen::Index n = J.cols();
-  Eigen::MatrixXd A(n, n);
-  kernels::for_each(n, [&](std::ptrdiff_t i) {
-    for (Eigen::Index j = 0; j <= i; ++j) A(i, j) = A(j, i) = J.col(i).dot(J.col(j));
+  // Within a parallel loop Eigen's product runs on one thread: the bits do not depend on how many
+  // there are.
+  constexpr Eigen::Index kBlocks = 64;
+  std::vector<Eigen::MatrixXd> parts(kBlocks);
+  kernels::for_each(kBlocks, [&](std::ptrdiff_t b) {
+    const Eigen::Index begin = J.rows() * b / kBlocks, end = J.rows() * (b + 1) / kBlocks;
+    const auto rows = J.middleRows(begin, end - begin);
+    parts[static_cast<std::size_t>(b)] = rows.transpose() * rows;
   });
+  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(J.cols(), J.cols());
+  for (const Eigen::MatrixXd& part : parts) A += part;
   return A;
 }
 

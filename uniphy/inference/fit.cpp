@@ -64,7 +64,7 @@ class Fit {
   std::int64_t most_work(const FitStage& stage) const {
     if (stage.optimizer != kLevenbergMarquardt) return stage.epochs;
     return std::int64_t(stage.epochs) *
-           (variables_.size() + FitProblem::kMotion + LevenbergMarquardt::kTrialEvaluations);
+           (variables_.size() + problem_.motion_size() + LevenbergMarquardt::kTrialEvaluations);
   }
 
   /// Saves where it is time to, tells the user, and stops where the user asked for it.
@@ -287,7 +287,8 @@ class Fit {
     }
     if (state_.candidates.empty()) fail("expected candidates, found none");
     for (const FitCandidate& c : state_.candidates) {
-      if (c.start < 0 || c.start >= variables_.starts() || c.u.numel() != variables_.size()) {
+      if (c.start < 0 || c.start >= variables_.starts() || c.u.numel() != variables_.size() ||
+          c.motion.numel() != problem_.motion_size()) {
         fail("a candidate does not fit the model");
       }
     }

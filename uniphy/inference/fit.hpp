@@ -45,8 +45,8 @@ inline constexpr double kNotRolledOut = std::numeric_limits<double>::max();
 struct FitCandidate {
   int start = 0;          ///< row of the starts
   torch::Tensor u;        ///< best so far in this stage, or where the stage starts
-  torch::Tensor motion;   ///< likewise [6]: what is added to the observed initial velocity, see
-                          ///< FitProblem
+  torch::Tensor motion;   ///< likewise: what is added to the observed initial state, see
+                          ///< FitProblem::leaves
   double loss = 0;        ///< of that point: mse/size² and the prior
   double mse = 0;         ///< m²
   std::string optimizer;  ///< Descent::save; of the stage before where this one has not begun
@@ -66,13 +66,13 @@ struct FitState {
 struct FitEnd {
   int start = 0;  ///< the start that it comes from
   std::vector<double> u;
-  RigidMotion motion;  ///< initial velocity that was used
+  InitialState motion;  ///< that was used
 };
 
 struct FitResult {
   kernels::LawDescription law;
   std::vector<double> u;
-  RigidMotion motion;             ///< initial velocity that was used
+  InitialState motion;            ///< initial state that was used
   double mse = 0;                 ///< m², over all frames
   int start = 0;                  ///< the start that it comes from
   std::vector<double> start_mse;  ///< [starts] over all frames, infinite where the roll-out failed;

@@ -25,11 +25,31 @@ constexpr double kNoisyStarts = 1e-3;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
+/// Units of the change of an initial state, and of the polynomials beside its rigid motion.
+constexpr double kLinearUnit = 0.1;   // m/s
+constexpr double kAngularUnit = 0.5;  // rad/s, 1/s
+constexpr double kStretchUnit = 0.05;
+
+Tensor units_of(int degree) {
+  const int rigid = 6, linear_terms = velocity_numbers(std::min(degree, 1));
+  Tensor units = torch::full({initial_numbers(degree)}, kStretchUnit, torch::kFloat64);
+  units.slice(0, 0, velocity_numbers(degree)) = kLinearUnit;
+  units.slice(0, rigid / 2, linear_terms) = kAngularUnit;
+  return units;
+}
+
+/// Where all that is rolled out stands at the first frame.
+std::vector<double> starts_of(const Observation& observation) {
+  std::vector<double> x = observation.start();
+  x.insert(x.end(), observation.tracers.begin(), observation.tracers.end());
+  return x;
+}
+
 }  // namespace
 
 FitProblem::FitProblem(const Observation& observation, const std::string& name,
                        const FitVariables& variables, const FitOptions& options,
-                       const RigidMotion* motion)
+                       const InitialState* motion)
     : observation_(observation),
       name_(name),
       variables_(variables),
@@ -40,20 +60,18 @@ FitProblem::FitProblem(const Observation& observation, const std::string& name,
       motion_(motion != nullptr ? *motion : observed_motion(observation, steps_, grid_)),
       contact_(first_contact(observation, steps_, grid_, motion_)),
       noise_(observed_noise(observation)),
-      fits_velocity_(observation.tracked() || noise_ > kNoisy * size_),
+      fits_velocity_(observation.tracked() || noise_ > kNoisy * size_ ||
+                     observation.start_degree > 0),
       fits_starts_(observation.tracked() || noise_ > kNoisyStarts * size_),
+      basis_(starts_of(observation), observation.particles, motion_),
+      observed_(numbers_of(motion_)),
+      units_(units_of(motion_.degree)),
       objective_(
           make_motion_objective(observation, steps_, grid_, options.dtype, options.rollout)) {
   if (options.stages.empty() || options.stages.back().horizon < 1) {
     throw Error("stages: expected a last stage with horizon 1");
   }
   kernels::make_law<double>(variables.law(variables.start(0)));  // a model that does not fit: now
-  std::vector<double> x = observation.start();
-  x.insert(x.end(), observation.tracers.begin(), observation.tracers.end());
-  v0_ = torch::tensor(motion_.velocities(x), torch::kFloat64).view({-1, 3});
-  const Eigen::Vector3d& centre = motion_.centre;
-  arm_ = torch::tensor(x, torch::kFloat64).view({-1, 3}) -
-         torch::tensor({centre[0], centre[1], centre[2]}, torch::kFloat64);
   const Tensor hidden = torch::tensor(observation.x, torch::kFloat64).isnan();
   if (hidden.any().item<bool>()) hidden_ = hidden.view({observation.frames, -1});
 }
@@ -82,18 +100,12 @@ FitCandidate FitProblem::candidate(int start) const {
   FitCandidate c;
   c.start = start;
   c.u = torch::tensor(variables_.start(start), torch::kFloat64);
-  c.motion = torch::zeros({kMotion}, torch::kFloat64);
+  c.motion = torch::zeros({motion_size()}, torch::kFloat64);
   return c;
 }
 
-RigidMotion FitProblem::motion(const FitCandidate& c) const {
-  RigidMotion m = motion_;
-  const double* change = c.motion.data_ptr<double>();
-  for (int k = 0; k < 3; ++k) {
-    m.linear[k] += kLinearUnit * change[k];
-    m.angular[k] += kAngularUnit * change[3 + k];
-  }
-  return m;
+InitialState FitProblem::motion(const FitCandidate& c) const {
+  return with_numbers(motion_, observed_ + units_ * c.motion);
 }
 
 std::vector<double> FitProblem::frame_mse(const FitCandidate& c, std::ptrdiff_t frames) const {
@@ -115,25 +127,20 @@ Tensor FitProblem::loss_of(const Tensor& mse, const Tensor& u) const {
 Tensor FitProblem::misses(const Tensor& point, std::ptrdiff_t frames) const {
   const torch::NoGradGuard no_grad;
   const std::int64_t size = variables_.size();
-  const Tensor v0 = point.numel() > size ? velocities(point.slice(0, size)) : v0_;
-  return objective_->residuals(variables_.body(point.slice(0, 0, size), observation_.particles), v0,
-                               frames);
+  const Tensor change = point.numel() > size ? point.slice(0, size) : torch::zeros_like(observed_);
+  return objective_->residuals(variables_.body(point.slice(0, 0, size), observation_.particles),
+                               fields(change), frames);
 }
 
-RigidMotion FitProblem::motion_at(const Tensor& point) const {
+InitialState FitProblem::motion_at(const Tensor& point) const {
   FitCandidate at;
-  at.motion = point.numel() > variables_.size() ? point.slice(0, variables_.size()).contiguous()
-                                                : torch::zeros({kMotion}, torch::kFloat64);
+  at.motion = point.numel() > variables_.size() ? point.slice(0, variables_.size())
+                                                : torch::zeros_like(observed_);
   return motion(at);
 }
 
-Tensor FitProblem::change_to(const RigidMotion& to) const {
-  Tensor change = torch::empty({kMotion}, torch::kFloat64);
-  for (int k = 0; k < 3; ++k) {
-    change[k] = (to.linear[k] - motion_.linear[k]) / kLinearUnit;
-    change[3 + k] = (to.angular[k] - motion_.angular[k]) / kAngularUnit;
-  }
-  return change;
+Tensor FitProblem::change_to(const InitialState& to) const {
+  return (numbers_of(to) - observed_) / units_;
 }
 
 StartCorrection FitProblem::start_correction(const Tensor& point, std::ptrdiff_t frames) const {
@@ -150,7 +157,8 @@ Tensor FitProblem::residuals(const Tensor& point, std::ptrdiff_t frames,
     Tensor r = misses(point, frames);
     if (starts != nullptr) r = starts->remaining(r);
     r = r.view({frames, P, 3});
-    const std::int64_t stride = (all + kMostResiduals - 1) / kMostResiduals;
+    const std::int64_t most = most_residuals(point.numel());
+    const std::int64_t stride = (all + most - 1) / most;
     if (stride > 1) r = r.slice(1, 0, P, stride);
     const double seen = objective_->seen_per_frame() / static_cast<double>(3 * P);
     r = r.flatten() / (size_ * std::sqrt(static_cast<double>(r.numel()) * seen));
@@ -161,6 +169,10 @@ Tensor FitProblem::residuals(const Tensor& point, std::ptrdiff_t frames,
   } catch (const Error&) {  // the roll-out failed
     return {};
   }
+}
+
+std::int64_t FitProblem::most_residuals(std::int64_t columns) {
+  return std::min(kMostResiduals, kMostInJacobian / std::max<std::int64_t>(columns, 1));
 }
 
 double FitProblem::loss(double mse, const Tensor& u) const {
@@ -184,11 +196,8 @@ std::vector<Tensor> FitProblem::leaves(const FitCandidate& c, int stage) const {
   return result;
 }
 
-/// The observed velocity and the change of it: linear + angular × (x − centre).
-Tensor FitProblem::velocities(const Tensor& motion) const {
-  const Tensor linear = kLinearUnit * motion.slice(0, 0, 3);
-  const Tensor angular = kAngularUnit * motion.slice(0, 3, 6);
-  return v0_ + linear + torch::cross(angular.expand_as(arm_), arm_, 1);
+InitialFields FitProblem::fields(const Tensor& change) const {
+  return basis_.fields(observed_ + units_ * change);
 }
 
 FitProblem::Evaluation FitProblem::evaluate(const std::vector<Tensor>& leaves, int stage) const {
@@ -196,8 +205,8 @@ FitProblem::Evaluation FitProblem::evaluate(const std::vector<Tensor>& leaves, i
   for (const Tensor& leaf : leaves) leaf.mutable_grad() = Tensor();
   try {
     const ops::RolloutBody body = variables_.body(leaves[0], observation_.particles);
-    const Tensor v0 = leaves.size() > 1 ? velocities(leaves[1]) : v0_;
-    const Tensor mse = objective_->mse(body, v0, frames(stage));
+    const Tensor change = leaves.size() > 1 ? leaves[1] : torch::zeros_like(observed_);
+    const Tensor mse = objective_->mse(body, fields(change), frames(stage));
     const Tensor loss = loss_of(mse, leaves[0]);
     loss.backward();
     bool finite = std::isfinite(loss.item<double>());

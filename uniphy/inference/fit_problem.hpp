@@ -19,7 +19,7 @@ class FitProblem {
   /// initial velocity. Throws Error where the schedule has no last stage with horizon 1 or the
   /// model does not fit.
   FitProblem(const Observation& observation, const std::string& name, const FitVariables& variables,
-             const FitOptions& options, const RigidMotion* motion = nullptr);
+             const FitOptions& options, const InitialState* motion = nullptr);
 
   const FitVariables& variables() const { return variables_; }
   int stages() const { return static_cast<int>(options_.stages.size()); }
@@ -37,8 +37,8 @@ class FitProblem {
 
   /// A candidate at the start, with the observed initial velocity; its loss is not known yet.
   FitCandidate candidate(int start) const;
-  /// The initial velocity of a candidate.
-  RigidMotion motion(const FitCandidate& c) const;
+  /// The initial state of a candidate.
+  InitialState motion(const FitCandidate& c) const;
 
   /// The error (m²) of every frame up to `frames`, infinite from where the roll-out fails.
   std::vector<double> frame_mse(const FitCandidate& c, std::ptrdiff_t frames) const;
@@ -49,7 +49,7 @@ class FitProblem {
   double mse_of(double loss, const torch::Tensor& u) const;
 
   /// Leaves to be moved in a stage, copies of the candidate's: u [size], and where it moves the
-  /// initial velocity the change of it [kMotion], in units of kLinearUnit and kAngularUnit.
+  /// initial state the change of it [motion_size()], in the units of motion_units().
   std::vector<torch::Tensor> leaves(const FitCandidate& c, int stage) const;
   /// Whether a stage moves the initial velocity: the last one does. Gradients do so only where
   /// there is noise: else the first frames tell it better than a law that is still far off, and a
@@ -64,23 +64,23 @@ class FitProblem {
   /// undefined where the loss is not finite.
   Evaluation evaluate(const std::vector<torch::Tensor>& leaves, int stage) const;
 
-  /// Numbers of the change of the initial velocity, and their units, those of leaves().
-  static constexpr int kMotion = 6;
-  static constexpr double kLinearUnit = 0.1;   // m/s
-  static constexpr double kAngularUnit = 0.5;  // rad/s
+  /// Numbers of the change of the initial state.
+  int motion_size() const { return static_cast<int>(units_.numel()); }
+  /// Their units [motion_size()], those of leaves(); the numbers are as in numbers_of().
+  const torch::Tensor& motion_units() const { return units_; }
   /// What least squares minimise over the first `frames` at a point: u, or u and the change of the
-  /// initial velocity [size + kMotion]. (x̂ − x)/size, or what `starts`, of as many frames, leaves
-  /// of it, and the root of the prior, scaled so that the sum of the squares is loss(). Undefined
-  /// where the roll-out fails. Of very many points, every n-th is taken, so that a column of a
-  /// Jacobian has no more than kMostResiduals numbers.
+  /// initial state [size + motion_size()]. (x̂ − x)/size, or what `starts`, of as many frames,
+  /// leaves of it, and the root of the prior, scaled so that the sum of the squares is loss().
+  /// Undefined where the roll-out fails. Of very many points, every n-th is taken, so that a column
+  /// of a Jacobian has no more than kMostResiduals numbers.
   torch::Tensor residuals(const torch::Tensor& point, std::ptrdiff_t frames,
                           const StartCorrection* starts = nullptr) const;
   /// x̂ − x [frames, 3 points], m, at such a point. Throws Error where the roll-out fails.
   torch::Tensor misses(const torch::Tensor& point, std::ptrdiff_t frames) const;
-  /// The change of the initial velocity that makes it `to`, [kMotion] in the units of leaves().
-  torch::Tensor change_to(const RigidMotion& to) const;
-  /// The initial velocity at such a point.
-  RigidMotion motion_at(const torch::Tensor& point) const;
+  /// The change of the initial state that makes it `to`, [motion_size()] in the units of leaves().
+  torch::Tensor change_to(const InitialState& to) const;
+  /// The initial state at such a point.
+  InitialState motion_at(const torch::Tensor& point) const;
   /// Of the starts, by the flow at such a point.
   StartCorrection start_correction(const torch::Tensor& point, std::ptrdiff_t frames) const;
 
@@ -89,7 +89,9 @@ class FitProblem {
  private:
   double prior_weight() const;
   torch::Tensor loss_of(const torch::Tensor& mse, const torch::Tensor& u) const;
-  torch::Tensor velocities(const torch::Tensor& motion) const;
+  InitialFields fields(const torch::Tensor& change) const;
+  /// What a column of a Jacobian of least squares at a point of so many numbers may have.
+  static std::int64_t most_residuals(std::int64_t columns);
 
   const Observation& observation_;
   const std::string& name_;
@@ -98,13 +100,13 @@ class FitProblem {
   ObservedSteps steps_;
   kernels::GridSettings grid_;
   double size_;
-  RigidMotion motion_;
+  InitialState motion_;
   std::ptrdiff_t contact_;
   double noise_;  ///< m
   bool fits_velocity_, fits_starts_;
-  /// [particles and tracers, 3] observed velocity, position from the centre
-  torch::Tensor v0_, arm_;
-  torch::Tensor hidden_;  ///< [frames, 3 points]; undefined: nothing is
+  InitialBasis basis_;              ///< of particles and tracers
+  torch::Tensor observed_, units_;  ///< [motion_size()] numbers of motion_, units of their change
+  torch::Tensor hidden_;            ///< [frames, 3 points]; undefined: nothing is
   std::unique_ptr<const MotionObjective> objective_;
 };
 
@@ -113,7 +115,7 @@ class FitProblem {
 double least_pull(double noise, double coordinates);
 
 /// 8 MB a column: a Jacobian of thirty is 240 MB. The benchmark cube of the field over 1000 steps,
-/// a frame every 5, has 603,000.
-inline constexpr std::int64_t kMostResiduals = 1000000;
+/// a frame every 5, has 603,000. Of more columns, each has less.
+inline constexpr std::int64_t kMostResiduals = 1000000, kMostInJacobian = 30000000;
 
 }  // namespace uniphy

@@ -1,6 +1,8 @@
 #include <fmt/format.h>
 #include <torch/torch.h>
 
+#include <algorithm>
+
 #include "ops/kernels/base/error.hpp"
 #include "uniphy/inference/fit.hpp"
 #include "uniphy/inference/optimizer_bytes.hpp"
@@ -24,10 +26,10 @@ struct Table {
   }
 };
 
-constexpr std::size_t kHeader = 9;  // columns of a candidate before u
+constexpr std::size_t kHeader = 4;  // columns of a candidate before its initial state and u
 
 std::vector<double> flat(const FitCandidate& c) {
-  std::vector<double> row{static_cast<double>(c.start), c.loss, c.mse};
+  std::vector<double> row{double(c.start), c.loss, c.mse, double(c.motion.numel())};
   for (const torch::Tensor* t : {&c.motion, &c.u}) {
     row.insert(row.end(), t->data_ptr<double>(), t->data_ptr<double>() + t->numel());
   }
@@ -43,8 +45,10 @@ FitCandidate candidate(const double* row, std::size_t columns) {
   c.start = static_cast<int>(row[0]);
   c.loss = row[1];
   c.mse = row[2];
-  c.motion = tensor(row + 3, kHeader - 3);
-  c.u = tensor(row + kHeader, columns - kHeader);
+  const std::size_t most = columns - kHeader;
+  const auto motion = static_cast<std::size_t>(std::clamp(row[3], 0.0, double(most)));
+  c.motion = tensor(row + kHeader, motion);
+  c.u = tensor(row + kHeader + motion, most - motion);
   return c;
 }
 
@@ -63,7 +67,7 @@ void write_fit_state(const std::filesystem::path& file, const FitState& state,
                      const std::string& fingerprint) {
   hdf5::Writer writer(file);
   writer.attribute("/", "format", kFormat);
-  writer.attribute("/", "version", 2);
+  writer.attribute("/", "version", 3);
   writer.attribute("/", "fingerprint", fingerprint);
   writer.attribute("/", "stage", state.stage);
   writer.attribute("/", "steps", state.steps);
@@ -75,7 +79,7 @@ void write_fit_state(const std::filesystem::path& file, const FitState& state,
     history.add({double(r.stage), double(r.candidate), double(r.epoch), r.horizon, r.mse});
   }
   writer.write("candidates", candidates.data, candidates.shape,
-               {"1", "start, loss, mse, change of the linear and angular velocity, u"});
+               {"1", "start, loss, mse, numbers of the initial state, change of those, u"});
   std::vector<std::string> optimizers;
   for (const FitCandidate& c : state.candidates) optimizers.push_back(c.optimizer);
   write_optimizers(writer, optimizers);
@@ -86,8 +90,8 @@ void write_fit_state(const std::filesystem::path& file, const FitState& state,
 
 FitState read_fit_state(const std::filesystem::path& file, const std::string& fingerprint) {
   const hdf5::Reader reader(file);
-  if (reader.check_format(kFormat, 2) < 2) {
-    reader.fail("attribute version of /", "expected 2; remove the file to start anew");
+  if (reader.check_format(kFormat, 3) < 3) {
+    reader.fail("attribute version of /", "expected 3; remove the file to start anew");
   }
   check_fingerprint(reader, fingerprint);
   check_seal(file);

@@ -90,6 +90,11 @@ ObservationSource read_observation_source(Section& config) {
   source.noise = config.real("noise", 0, between(0, 1), "m",
                              "standard deviation of a coordinate; 0: what the observation says, "
                              "else estimated from it");
+  source.start_degree = static_cast<int>(config.integer(
+      "start_degree", -1, between(-1, kMostStartDegree), "",
+      "0: at the first frame the body is undeformed and moves as a rigid one; 1 to 3: it is "
+      "deformed, and its velocity and stretch there are fitted as polynomials in the place (2 does "
+      "for most; a Jacobian takes 36, 90 or 180 roll-outs more); -1: what the observation says"));
   Section s = config.section("resolution", "how finely the observation is simulated");
   source.resolution.grid = static_cast<int>(
       s.integer("grid", 0, between(0, 1024), "",
@@ -105,6 +110,7 @@ ObservationSource read_observation_source(Section& config) {
 Observation ObservationSource::load(std::vector<std::string>& warnings) const {
   Observation seen = at_resolution(read_observation(file), resolution, file.string(), warnings);
   if (noise > 0) seen.noise = noise;
+  if (start_degree >= 0) seen.start_degree = start_degree;
   return seen;
 }
 

@@ -315,7 +315,8 @@ std::string fit_fingerprint(const Observation& observation, const FitVariables& 
   hash.add(fmt::format("{} {} {} {} {} {} {}", observation.grid, observation.dt,
                        observation.gravity[0], observation.gravity[1], observation.gravity[2],
                        observation.walls, observation.bound));
-  hash.add(std::vector<double>{observation.density, observation.noise});
+  hash.add(std::vector<double>{observation.density, observation.noise,
+                               double(observation.start_degree)});
   for (int i = 0; i < variables.starts(); ++i) hash.add(variables.start(i));
   add_weights(hash, variables.law(variables.start(0)));
   hash.add(text);

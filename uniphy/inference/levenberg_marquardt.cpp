@@ -9,6 +9,8 @@
 #include <limits>
 #include <numeric>
 #include <sstream>
+#include <utility>
+#include <vector>
 
 #include "ops/kernels/base/error.hpp"
 #include "ops/kernels/base/for_each.hpp"
@@ -42,12 +44,34 @@ Eigen::VectorXd damped_step(Eigen::MatrixXd A, const Eigen::VectorXd& g, double 
   return -Eigen::LDLT<Eigen::MatrixXd>(A).solve(g);
 }
 
-/// Jᵀr in one order of summation on any number of threads.
-Eigen::VectorXd slope(const Eigen::MatrixXd& J, const Tensor& r) {
-  Eigen::VectorXd g(J.cols());
-  for (Eigen::Index i = 0; i < g.size(); ++i) g[i] = J.col(i).dot(vector_of(r));
-  return g;
-}
+/// J + Σ m cᵀ, with what is added kept apart: a Jacobian may be hundreds of megabytes.
+class MendedJacobian {
+ public:
+  MendedJacobian(const Eigen::MatrixXd& J, Eigen::MatrixXd A) : J_(J), A_(std::move(A)) {}
+
+  const Eigen::MatrixXd& normal() const { return A_; }
+  Eigen::VectorXd transposed_times(const Eigen::VectorXd& r) const {
+    Eigen::VectorXd g(J_.cols());
+    for (Eigen::Index i = 0; i < g.size(); ++i) g[i] = J_.col(i).dot(r);
+    for (const auto& [m, c] : added_) g += m.dot(r) * c;
+    return g;
+  }
+  Eigen::VectorXd times(const Eigen::VectorXd& step) const {
+    Eigen::VectorXd r = J_ * step;
+    for (const auto& [m, c] : added_) r += c.dot(step) * m;
+    return r;
+  }
+  void add(Eigen::VectorXd m, Eigen::VectorXd c) {
+    const Eigen::VectorXd g = transposed_times(m);
+    A_ += g * c.transpose() + c * g.transpose() + m.squaredNorm() * c * c.transpose();
+    added_.emplace_back(std::move(m), std::move(c));
+  }
+
+ private:
+  const Eigen::MatrixXd& J_;
+  Eigen::MatrixXd A_;  ///< the product of its transpose with it
+  std::vector<std::pair<Eigen::VectorXd, Eigen::VectorXd>> added_;
+};
 
 Tensor moved(const Tensor& point, const Eigen::VectorXd& step) {
   Tensor result = point.clone();
@@ -121,16 +145,19 @@ Tensor LevenbergMarquardt::step(const Residuals& residuals) {
   return torch::scalar_tensor(loss_, torch::kFloat64);
 }
 
-LevenbergMarquardt::Trial LevenbergMarquardt::trial(const Residuals& residuals, Eigen::MatrixXd J,
-                                                    Eigen::MatrixXd A, double damping) const {
+LevenbergMarquardt::Trial LevenbergMarquardt::trial(const Residuals& residuals,
+                                                    const Eigen::MatrixXd& slopes,
+                                                    const Eigen::MatrixXd& normal,
+                                                    double damping) const {
+  MendedJacobian J(slopes, normal);
   Trial best;
   best.loss = kInfinity;
   Tensor at = point(), r = residuals_;
   double loss = loss_;
   for (int k = 0; k < kTrialSteps; ++k) {
-    const Eigen::VectorXd g = slope(J, r);
-    const Eigen::VectorXd step = damped_step(A, g, damping);
-    if (k == 0) best.predicted = -(2 * g.dot(step) + step.dot(A * step));
+    const Eigen::VectorXd g = J.transposed_times(vector_of(r));
+    const Eigen::VectorXd step = damped_step(J.normal(), g, damping);
+    if (k == 0) best.predicted = -(2 * g.dot(step) + step.dot(J.normal() * step));
     if (!step.allFinite() || step.isZero(0)) break;
     at = moved(at, step);
     const Tensor next = residuals(at);
@@ -144,9 +171,8 @@ LevenbergMarquardt::Trial LevenbergMarquardt::trial(const Residuals& residuals, 
     const bool off = k == 0 && std::isfinite(after) && !(after < loss);  // off the valley, perhaps
     const bool worthwhile = loss - after > kWorthwhile * std::max(0.0, loss_ - after);
     if (!off && !worthwhile) break;
-    const Eigen::VectorXd missed = vector_of(next) - vector_of(r) - J * step;
-    J += missed * (2 / step.squaredNorm() * step).transpose();
-    A = normal_matrix(J);
+    const Eigen::VectorXd missed = vector_of(next) - vector_of(r) - J.times(step);
+    J.add(missed, 2 / step.squaredNorm() * step);
     r = next;
     loss = after;
   }

@@ -83,8 +83,8 @@ class LevenbergMarquardt : public torch::optim::Optimizer {
   const LevenbergMarquardtOptions& options() const;
   void move_to(const torch::Tensor& point);
   /// The lowest point of a trial; damping as a number, A = JᵀJ.
-  Trial trial(const Residuals& residuals, Eigen::MatrixXd J, Eigen::MatrixXd A,
-              double damping) const;
+  Trial trial(const Residuals& residuals, const Eigen::MatrixXd& slopes,
+              const Eigen::MatrixXd& normal, double damping) const;
   Trial best_trial(const Residuals& residuals, const Eigen::MatrixXd& J);
 
   torch::Tensor residuals_;  ///< [M] at the leaves; undefined: not known

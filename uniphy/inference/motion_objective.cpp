@@ -55,14 +55,15 @@ class RolloutObjective : public MotionObjective {
                            [](double share) { return share > 0; });
   }
 
-  Tensor mse(const ops::RolloutBody& body, const Tensor& v0, std::ptrdiff_t frames) const override {
+  Tensor mse(const ops::RolloutBody& body, const InitialFields& start,
+             std::ptrdiff_t frames) const override {
     // First within the frames: sums of rows have one order on any number of threads.
-    const Tensor square = residuals(body, v0, frames).square();
+    const Tensor square = residuals(body, start, frames).square();
     if (!hidden_.defined()) return square.mean(1).mean();
     return square.sum(1).mean() / per_frame_;
   }
 
-  Tensor residuals(const ops::RolloutBody& body, const Tensor& v0,
+  Tensor residuals(const ops::RolloutBody& body, const InitialFields& start,
                    std::ptrdiff_t frames) const override {
     ops::RolloutSettings settings;
     settings.grid = grid_;
@@ -76,8 +77,9 @@ class RolloutObjective : public MotionObjective {
       tracers.end = all;
       tracers.tracers = true;
     }
-    const Tensor states = rollout_(x0_, v0.to(x0_.dtype()), {}, {}, mass_tensor_, volume_tensor_,
-                                   bodies, settings, {})
+    const auto cast = [&](const Tensor& t) { return t.defined() ? t.to(x0_.dtype()) : t; };
+    const Tensor states = rollout_(x0_, cast(start.v), cast(start.C), cast(start.F), mass_tensor_,
+                                   volume_tensor_, bodies, settings, {})
                               .x.slice(1, all - points_, all)
                               .flatten(1)
                               .to(torch::kFloat64);
@@ -87,12 +89,12 @@ class RolloutObjective : public MotionObjective {
 
   double seen_per_frame() const override { return per_frame_; }
 
-  std::vector<double> frame_mse(const kernels::LawDescription& law, const RigidMotion& motion,
+  std::vector<double> frame_mse(const kernels::LawDescription& law, const InitialState& from,
                                 std::ptrdiff_t frames) const override {
     std::vector<double> result(frames, kInfinity);
     try {
       const kernels::Rollout<T> rollout = rollout_of(law);
-      visit_frames(rollout, initial(motion), steps_, frames,
+      visit_frames(rollout, initial(from), steps_, frames,
                    [&](std::ptrdiff_t frame, const std::vector<T>& x) {
                      const double mse = frame_error(points_of(x), frame);
                      if (std::isfinite(mse)) result[frame] = mse;
@@ -102,17 +104,17 @@ class RolloutObjective : public MotionObjective {
     return result;
   }
 
-  void simulate(const kernels::LawDescription& law, const RigidMotion& motion,
+  void simulate(const kernels::LawDescription& law, const InitialState& from,
                 const std::function<void(std::ptrdiff_t, const std::vector<double>&)>& on_frame)
       const override {
     const kernels::Rollout<T> rollout = rollout_of(law);
-    visit_frames(rollout, initial(motion), steps_, observation_.frames,
+    visit_frames(rollout, initial(from), steps_, observation_.frames,
                  [&](std::ptrdiff_t frame, const std::vector<T>& x) {
                    on_frame(frame, std::vector<double>(points_of(x), x.data() + x.size()));
                  });
   }
 
-  Tensor flow_gradients(const kernels::LawDescription& law, const RigidMotion& motion,
+  Tensor flow_gradients(const kernels::LawDescription& law, const InitialState& from,
                         std::ptrdiff_t frames) const override {
     // Of points that are particles, too, tracers tell: the F of a particle is what its law leaves.
     std::vector<double> start(start_.begin(), start_.begin() + 3 * particles_);
@@ -126,17 +128,15 @@ class RolloutObjective : public MotionObjective {
         {{0, particles_, kernels::make_law<T>(law)},
          {particles_, particles_ + points_, std::make_shared<const kernels::Tracer<T>>()}},
         mass, volume);
-    const std::vector<double> v = motion.velocities(start);
-    const auto state =
-        kernels::ParticleState<T>::undeformed({start.begin(), start.end()}, {v.begin(), v.end()});
-    return torch::tensor(gradients(rollout, state, frames, particles_, particles_ + points_),
-                         torch::kFloat64)
+    return torch::tensor(
+               gradients(rollout, state_of(from, start), frames, particles_, particles_ + points_),
+               torch::kFloat64)
         .view({frames, points_, 3, 3});
   }
 
-  std::vector<double> deformations(const kernels::LawDescription& law, const RigidMotion& motion,
+  std::vector<double> deformations(const kernels::LawDescription& law, const InitialState& from,
                                    std::ptrdiff_t frames) const override {
-    return gradients(rollout_of(law), initial(motion), frames, 0, particles_);
+    return gradients(rollout_of(law), initial(from), frames, 0, particles_);
   }
 
  private:
@@ -165,10 +165,21 @@ class RolloutObjective : public MotionObjective {
     return F;
   }
 
-  kernels::ParticleState<T> initial(const RigidMotion& motion) const {
-    const std::vector<double> v = motion.velocities(start_);
-    return kernels::ParticleState<T>::undeformed({start_.begin(), start_.end()},
-                                                 {v.begin(), v.end()});
+  kernels::ParticleState<T> initial(const InitialState& from) const {
+    return state_of(from, start_);
+  }
+
+  /// Of particles and of tracers behind them.
+  kernels::ParticleState<T> state_of(const InitialState& from, const std::vector<double>& x) const {
+    const InitialFields fields = fields_of(from, x, particles_);
+    auto state = kernels::ParticleState<T>::undeformed({x.begin(), x.end()}, numbers(fields.v));
+    if (fields.C.defined()) state.C = numbers(fields.C);
+    if (fields.F.defined()) state.F = numbers(fields.F);
+    return state;
+  }
+  static std::vector<T> numbers(const Tensor& t) {
+    const Tensor flat = t.contiguous();
+    return {flat.data_ptr<double>(), flat.data_ptr<double>() + flat.numel()};
   }
 
   /// Where the points begin in the positions of all that is rolled out.

@@ -12,6 +12,7 @@
 #include "ops/kernels/base/error.hpp"
 #include "ops/kernels/laws/tracer.hpp"
 #include "ops/kernels/rollout/rollout.hpp"
+#include "uniphy/inference/deformed_start.hpp"
 #include "uniphy/inference/misfit.hpp"
 #include "uniphy/inference/observed_frames.hpp"
 #include "uniphy/inference/observed_noise.hpp"
@@ -197,15 +198,15 @@ void fit_motion(const Observation& observation, const Flight& flight, bool linea
 /// Files may hold float32: what its rounding takes from a position in the unit cube.
 constexpr double kRounding = 6e-8;
 
-std::array<double, 6> spread_of(const Observation& observation, const Flight& flight, int frames,
-                                const RigidMotion& motion) {
+std::vector<double> spread_of(const Observation& observation, const Flight& flight, int frames,
+                              const RigidMotion& motion) {
   const FlightEquations e = equations(observation, flight, 0, frames, motion);
   const auto count = static_cast<double>(std::max<std::size_t>(e.count, 1));
   const double noise = std::max(observed_noise(observation), kRounding), square = noise * noise;
   // Where a point starts is as noisy as where it is later, and all its frames share that error.
   const double allowed = 2 * kNoiseAllowance * kNoiseAllowance * square;
   const double beside = std::max(0.0, e.square / count - allowed);  // m²
-  std::array<double, 6> spread{};
+  std::vector<double> spread(6);
   for (int k = 0; k < 6; ++k) {
     spread[k] =
         std::sqrt(((1 + frames) * square + count * beside) / std::max(e.normal(k, k), 1e-300));
@@ -321,13 +322,14 @@ RigidMotion observed_motion(const Observation& observation, const ObservedSteps&
   return motion;
 }
 
-RigidMotion observed_motion(const Observation& observation, const ObservedSteps& steps,
-                            const kernels::GridSettings& grid) {
+InitialState observed_motion(const Observation& observation, const ObservedSteps& steps,
+                             const kernels::GridSettings& grid) {
   return estimate_motion(observation, steps, grid).motion;
 }
 
 MotionEstimate estimate_motion(const Observation& observation, const ObservedSteps& steps,
                                const kernels::GridSettings& grid) {
+  if (observation.start_degree > 0) return estimate_deformed_start(observation);
   int frames = 1;
   RigidMotion motion = observed_motion(observation, steps, grid, frames);
   if (observed_noise(observation) > kLittleNoise * observed_size(observation)) {
@@ -347,6 +349,7 @@ MotionEstimate estimate_motion(const Observation& observation, const ObservedSte
 
 std::ptrdiff_t first_contact(const Observation& observation, const ObservedSteps& steps,
                              const kernels::GridSettings& grid, const RigidMotion& motion) {
+  if (observation.start_degree > 0) return 0;
   const bool complete = is_complete(observation);
   if (complete && flies_freely(observation, steps, grid)) return observation.frames;
   for (std::ptrdiff_t f = 1; f < observation.frames; ++f) {

@@ -1,12 +1,11 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <array>
 #include <string>
 #include <vector>
 
 #include "ops/kernels/mpm/grid.hpp"
-#include "uniphy/inference/rigid_motion.hpp"
+#include "uniphy/inference/initial_state.hpp"
 #include "uniphy/io/observation.hpp"
 
 namespace uniphy {
@@ -59,17 +58,18 @@ RigidMotion observed_motion(const Observation& observation, const ObservedSteps&
                             const kernels::GridSettings& grid, int frames);
 
 /// The same from as many frames as the noise asks for: one where there is next to none, else those
-/// before the body reaches a wall and before it has turned by kFlightAngle.
-RigidMotion observed_motion(const Observation& observation, const ObservedSteps& steps,
-                            const kernels::GridSettings& grid);
+/// before the body reaches a wall and before it has turned by kFlightAngle. Of a body that is
+/// deformed there, see estimate_deformed_start.
+InitialState observed_motion(const Observation& observation, const ObservedSteps& steps,
+                             const kernels::GridSettings& grid);
 
 /// That motion and how well it is known.
 struct MotionEstimate {
-  RigidMotion motion;
-  /// Standard deviations of the linear (m/s) and the angular (rad/s) velocity: of the noise as of
+  InitialState motion;
+  /// [initial_numbers] standard deviations of its numbers, as in numbers_of: of the noise as of
   /// errors that the frames of a point share (its start) and that points do not, and of what free
   /// flight leaves beside it as of one error that all points share.
-  std::array<double, 6> spread{};
+  std::vector<double> spread;
 };
 MotionEstimate estimate_motion(const Observation& observation, const ObservedSteps& steps,
                                const kernels::GridSettings& grid);
@@ -85,7 +85,8 @@ Eigen::Isometry3d flight_pose(const ObservedSteps& steps, const kernels::GridSet
 /// complete observation it is where the centre of mass has left the parabola of free flight by more
 /// than 1 % of a cell, unless another parabola explains all frames (the motion of the first ones is
 /// noisy). Else it is where the body, flying on as a rigid one, is the first time so near a wall
-/// that it reads its nodes.
+/// that it reads its nodes. Of a body that is deformed at the first frame it is that one: stress
+/// acts from there on.
 std::ptrdiff_t first_contact(const Observation& observation, const ObservedSteps& steps,
                              const kernels::GridSettings& grid, const RigidMotion& motion);
 

@@ -20,6 +20,10 @@ using torch::Tensor;
 namespace {
 /// Beyond this a pull holds a number as well as any larger one, and rounding spoils the equations.
 constexpr double kMostPull = 1e3;
+constexpr int kRigid = 6;  ///< numbers of a rigid motion
+/// Over size: what no polynomial start tells of a motion. Numbers that the motion does not show (of
+/// a fluid, all of a stretch but its volume) are kept where they are by it.
+constexpr double kPolynomialError = 1e-4;
 }  // namespace
 
 RungFitter::RungFitter(const Observation& observation, const std::string& name,
@@ -93,7 +97,7 @@ LeastSquaresEnd RungFitter::least_squares(const Observation& seen, std::ptrdiff_
   const FitOptions options = rung_options(true);
   const FitVariables& variables = of(rung);
   const FitProblem problem(seen, name_, variables, options, &motion_);
-  const Tensor still = torch::zeros({with_motion ? FitProblem::kMotion : 0}, torch::kFloat64);
+  const Tensor still = torch::zeros({with_motion ? problem.motion_size() : 0}, torch::kFloat64);
   const Tensor from = torch::cat({start, still});
   Pull all{to, torch::full_like(to, pull)};
   if (with_motion) {
@@ -130,7 +134,7 @@ FitPosterior RungFitter::posterior(const Observation& seen, Rung rung, const Ten
   const FitOptions options = rung_options(true);
   const FitVariables& variables = of(rung);
   const FitProblem problem(seen, name_, variables, options, &motion_);
-  const Tensor at = torch::cat({point, torch::zeros({FitProblem::kMotion}, torch::kFloat64)});
+  const Tensor at = torch::cat({point, torch::zeros({problem.motion_size()}, torch::kFloat64)});
   const std::optional<StartCorrection> starts = starts_at(problem, at, seen.frames);
   std::vector<std::int64_t> columns;
   if (can_be_adapted(latent_)) {
@@ -138,7 +142,7 @@ FitPosterior RungFitter::posterior(const Observation& seen, Rung rung, const Ten
   } else {
     for (int k = 0; k < variables.size(); ++k) columns.push_back(k);
   }
-  for (int k = 0; k < FitProblem::kMotion; ++k) columns.push_back(point.numel() + k);
+  for (int k = 0; k < problem.motion_size(); ++k) columns.push_back(point.numel() + k);
   const auto begin = std::chrono::steady_clock::now();
   std::optional<Progress> progress;
   PosteriorOptions how;
@@ -152,7 +156,7 @@ FitPosterior RungFitter::posterior(const Observation& seen, Rung rung, const Ten
       [&](const Tensor& u) {
         return problem.residuals(u, seen.frames, starts ? &*starts : nullptr);
       },
-      at, columns, FitProblem::kMotion, problem.seen(seen.frames), how);
+      at, columns, problem.motion_size(), problem.seen(seen.frames), how);
   const std::chrono::duration<double> time = std::chrono::steady_clock::now() - begin;
   report(rung).roll_outs += result.evaluations;
   report(rung).seconds += time.count();
@@ -170,13 +174,11 @@ Tensor RungFitter::motion_pull(const FitProblem& problem, const Tensor& point,
     const double allowed = (starts ? kNoiseAllowance : 2) * noise;
     beside = std::max(0.0, misfit - allowed * allowed);
   }
+  if (problem.motion_size() > kRigid)
+    beside = std::max(beside, kPolynomialError * kPolynomialError);
   const double error = std::sqrt(noise * noise / problem.seen(frames) + beside);
-  Tensor weight = torch::empty({FitProblem::kMotion}, torch::kFloat64);
-  for (int k = 0; k < FitProblem::kMotion; ++k) {
-    const double unit = k < 3 ? FitProblem::kLinearUnit : FitProblem::kAngularUnit;
-    weight[k] = std::min(error * unit / first_motion_.spread[k], kMostPull);
-  }
-  return weight;
+  const Tensor spread = torch::tensor(first_motion_.spread, torch::kFloat64);
+  return (error * problem.motion_units() / spread).clamp_max(kMostPull);
 }
 
 Tensor RungFitter::start_shift(const Observation& seen, Rung rung, const Tensor& point) const {

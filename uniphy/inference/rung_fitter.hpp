@@ -33,8 +33,8 @@ class RungFitter {
   double size() const { return size_; }
   AdaptationState& state() { return state_; }
   /// The initial velocity of all roll-outs from now on.
-  void set_motion(const RigidMotion& motion) { motion_ = motion; }
-  const RigidMotion& motion() const { return motion_; }
+  void set_motion(const InitialState& motion) { motion_ = motion; }
+  const InitialState& motion() const { return motion_; }
   /// Where least squares on the first `frames` of `seen`, the observation or its first part, end,
   /// pulled to `to` by `pull`; where asked for, with the initial velocity, which then is that of
   /// all roll-outs. `task` is unique within the rung; for `least_gain` see uniphy::least_squares.
@@ -64,10 +64,10 @@ class RungFitter {
  private:
   FitOptions rung_options(bool differences) const;
   const FitVariables& of(Rung rung) const;
-  /// How strongly the initial velocity is pulled to the one of the first frames, [kMotion]: what
-  /// that is known to against what a roll-out misses. Noise is independent from point to point;
-  /// what the law, the grid or the time step leave beside it is one error that all share, so that
-  /// such a misfit does not move a velocity that is held.
+  /// How strongly the initial velocity is pulled to the one of the first frames,
+  /// [FitProblem::motion_size()]: what that is known to against what a roll-out misses. Noise is
+  /// independent from point to point; what the law, the grid or the time step leave beside it is
+  /// one error that all share, so that such a misfit does not move a velocity that is held.
   torch::Tensor motion_pull(const FitProblem& problem, const torch::Tensor& point,
                             std::ptrdiff_t frames, bool held) const;
   /// Where the points start, by the flow at a point; nothing where that is known or the roll-out
@@ -86,7 +86,7 @@ class RungFitter {
   AdaptationState state_;
   double size_;
   MotionEstimate first_motion_;  ///< from the first frames alone
-  RigidMotion motion_;
+  InitialState motion_;
   std::vector<std::unique_ptr<AdaptedVariables>> adapted_;  ///< of each rung; empty: analytic
   std::vector<RungReport> reports_;
 };

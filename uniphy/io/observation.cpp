@@ -69,6 +69,10 @@ void check_points(const Observation& o, const Fail& fail) {
   if (!std::isnan(o.noise) && !(o.noise >= 0 && o.noise < 1)) {
     fail("attribute noise of /x", fmt::format("expected 0 to 1 m, found {}", o.noise));
   }
+  if (o.start_degree < 0 || o.start_degree > kMostStartDegree) {
+    fail("attribute start_degree of /x",
+         fmt::format("expected 0 to {}, found {}", kMostStartDegree, o.start_degree));
+  }
 }
 
 void check_surface(const Observation& o, const Fail& fail) {
@@ -210,6 +214,9 @@ void write_observation(const std::filesystem::path& file, const Observation& obs
   writer.write("x", observation.x, {observation.frames, observation.points(), 3},
                {"m", "observed positions, NaN where hidden"});
   if (!std::isnan(observation.noise)) writer.attribute("x", "noise", observation.noise);
+  if (observation.start_degree != 0) {
+    writer.attribute("x", "start_degree", observation.start_degree);
+  }
   writer.write("time", observation.time, {observation.frames}, {"s", "time of each frame"});
   write_body(writer, observation);
   writer.group("scene");
@@ -232,6 +239,14 @@ Observation read_observation(const std::filesystem::path& file) {
   const hdf5::Shape shape = reader.shape("x");
   observation.frames = shape[0];
   if (reader.has_attribute("x", "noise")) observation.noise = reader.attribute_real("x", "noise");
+  const auto integer = [&](const char* object, const char* name) {
+    // The nearest int is out of every range that check() knows, too.
+    return static_cast<int>(std::clamp<std::int64_t>(reader.attribute_integer(object, name),
+                                                     std::numeric_limits<int>::min(),
+                                                     std::numeric_limits<int>::max()));
+  };
+  if (reader.has_attribute("x", "start_degree"))
+    observation.start_degree = integer("x", "start_degree");
   observation.time = reader.read<double>("time", {observation.frames}, hdf5::Values::finite);
   if (version == 1) {
     observation.particles = shape[1];
@@ -245,18 +260,12 @@ Observation read_observation(const std::filesystem::path& file) {
     read_body(reader, observation);
     observation.tracers.assign(observation.x.begin(), observation.x.begin() + 3 * shape[1]);
   }
-  const auto integer = [&](const char* name) {
-    // The nearest int is out of every range that check() knows, too.
-    return static_cast<int>(std::clamp<std::int64_t>(reader.attribute_integer("scene", name),
-                                                     std::numeric_limits<int>::min(),
-                                                     std::numeric_limits<int>::max()));
-  };
-  observation.grid = integer("grid");
+  observation.grid = integer("scene", "grid");
   observation.dt = reader.attribute_real("scene", "dt");
   const auto gravity = reader.attribute_reals("scene", "gravity", 3);
   observation.gravity = {gravity[0], gravity[1], gravity[2]};
   observation.walls = reader.attribute_text("scene", "walls");
-  observation.bound = integer("bound");
+  observation.bound = integer("scene", "bound");
   observation.density = reader.attribute_real("scene", "density");
   check(observation, [&](const std::string& object, const std::string& message) {
     reader.fail(object, message);

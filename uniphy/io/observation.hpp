@@ -5,6 +5,7 @@
 //   attributes  format = "uniphy-observation", version = 1 or 2
 //   /x      [frames, points, 3]     m   observed positions; NaN where a point is hidden
 //           attribute noise (m), optional: standard deviation of a coordinate
+//           attribute start_degree, optional: 0 to 3 (Observation::start_degree)
 //   /time   [frames]                s   increasing, at any times
 //   /scene  attributes: grid (nodes a side), dt (s), gravity [3] (m/s^2),
 //           walls ("freeslip" or "noslip"), bound (wall thickness in nodes), density (kg/m^3)
@@ -12,7 +13,7 @@
 // Version 1: the points are the particles of the body, all of them seen in the first frame.
 //   /volume [particles]             m^3 volume of each particle at rest
 //
-// Version 2: the body as it stands at the first frame, undeformed, and points on it that are not
+// Version 2: the body as it stands at the first frame and points on it that are not
 // its particles.
 //   /body/x [particles, 3]          m   particles, a dense cloud
 //   /body/volume [particles]        m^3 volume of each at rest
@@ -31,6 +32,9 @@
 
 namespace uniphy {
 
+/// Largest Observation::start_degree. Of the third, 180 numbers are fitted.
+inline constexpr int kMostStartDegree = 3;
+
 struct Observation {
   std::int64_t frames = 0;
   std::int64_t particles = 0;  ///< of the body; 0 while it is a surface
@@ -39,6 +43,9 @@ struct Observation {
   std::vector<double> volume;  ///< [particles] m^3
   /// Standard deviation of the noise of a coordinate, m; NaN: not known.
   double noise = std::numeric_limits<double>::quiet_NaN();
+  /// 0: at the first frame the body is undeformed and moves as a rigid one; else the degree of the
+  /// polynomials in the place that its velocity and stretch there are fitted as.
+  int start_degree = 0;
 
   /// [particles, 3] m, the body at the first frame; empty: point p is particle p, and stands where
   /// the first frame has it.

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 
 #include "tests/uniphy/support/scratch.hpp"
 
@@ -56,6 +57,30 @@ TEST(LaboratoryView, APartOfThePointsIsTrackedBesideTheBody) {
   EXPECT_NE(laboratory_view(whole, view).tracers, seen.tracers);
   view.seed = 1;
   EXPECT_EQ(laboratory_view(whole, view).tracers, seen.tracers);
+}
+
+TEST(LaboratoryView, MayBeginLater) {
+  const Observation whole = moving_box();
+  LaboratoryView view;
+  view.first = 4;
+  view.stride = 8;
+  const Observation seen = laboratory_view(whole, view);
+  EXPECT_EQ(seen.time, (std::vector<double>{whole.time[4], whole.time[12], whole.time[20]}));
+  EXPECT_EQ(std::vector<double>(whole.positions(4), whole.positions(5)), seen.start());
+  view.share = 0.5;  // the body beside the points is that of the frame, too
+  EXPECT_EQ(laboratory_view(whole, view).body, seen.start());
+  view.first = 13;
+  EXPECT_THAT(testing::error_of([&] { laboratory_view(whole, view); }),
+              HasSubstr("expected at least two of 0 to 20, found every 8th from 13 to 20"));
+}
+
+TEST(LaboratoryView, ABodyThatIsNotSeenLaterCannotBeginThere) {
+  Observation whole = moving_box();
+  whole.x[3 * 64 * 2 + 5] = std::numeric_limits<double>::quiet_NaN();
+  LaboratoryView view;
+  view.first = 2;
+  EXPECT_THAT(testing::error_of([&] { laboratory_view(whole, view); }),
+              HasSubstr("frames.first: expected all particles of the body in frame 2"));
 }
 
 TEST(LaboratoryView, NoiseAndHiddenPointsAreAsManyAsAskedFor) {

@@ -53,6 +53,19 @@ TEST(OpenWorldCases, AFinerTruthStandsWhereTheCoarseOneDoes) {
   for (std::int64_t f = 0; f < a.frames; ++f) EXPECT_NEAR(a.time[f], b.time[f], 1e-12);
 }
 
+TEST(OpenWorldCases, ADeformedStartIsLaterInTheSameMotion) {
+  const OpenWorldMotion later =
+      open_world_motion(small_cube(), soft(), OpenWorldCase::deformed, 0.005, 1);
+  const OpenWorldMotion all =
+      open_world_motion(small_cube(), soft(), OpenWorldCase::closed, 0.005, 1);
+  const Observation &a = later.motion.seen, &b = all.motion.seen;
+  const std::int64_t first = b.frames / 5;
+  ASSERT_EQ(a.frames, b.frames - first);
+  EXPECT_EQ(a.start_degree, 2);
+  EXPECT_EQ(a.time[0], b.time[first]);
+  EXPECT_EQ(a.x, std::vector<double>(b.positions(first), b.positions(b.frames)));
+}
+
 TEST(OpenWorldCases, ATenthOfThePointsInEveryTenthFrame) {
   const OpenWorldMotion m =
       open_world_motion(small_cube(), soft(), OpenWorldCase::hidden, 0.005, 1);

@@ -99,6 +99,29 @@ TEST(FitProblem, GradientByTheInitialVelocity) {
   EXPECT_NEAR(moved.angular[1] - observed.angular[1], 0.2, 1e-12);  // and of 0.5 rad/s
 }
 
+TEST(FitProblem, GradientByADeformedStart) {
+  Setting s;
+  s.observation.start_degree = 1;
+  const FitOptions options = options_with(0, true);
+  const FitProblem problem(s.observation, s.name, *s.variables, options);
+  ASSERT_EQ(problem.motion_size(), 36);
+  FitCandidate c = problem.candidate(3);
+  torch::manual_seed(2);
+  c.motion = 0.2 * torch::randn({36}, torch::kFloat64);
+  const std::vector<Tensor> leaves = problem.leaves(c, 0);
+  ASSERT_EQ(leaves.size(), 2u);
+  ASSERT_TRUE(std::isfinite(problem.evaluate(leaves, 0).mse));
+  const std::vector<double> found = numbers(leaves[1].grad());
+  const auto value = [&](const std::vector<double>& motion) {
+    FitCandidate moved = c;
+    moved.motion = torch::tensor(motion, torch::kFloat64);
+    return problem.evaluate(problem.leaves(moved, 0), 0).loss.item<double>();
+  };
+  const auto expected =
+      testing::central_differences(value, numbers(c.motion), std::vector<double>(36, 1e-5));
+  EXPECT_LT(testing::relative_error(found, expected), 1e-5);
+}
+
 TEST(FitProblem, TheSquaresOfTheResidualsSumToTheLoss) {
   const Setting s;
   for (const double weight : {0.0, 0.3}) {

@@ -44,7 +44,7 @@ struct Problem {
     return {0, observation.particles, law, parameters};
   }
   double mse(const kernels::LawDescription& law, std::ptrdiff_t frames) const {
-    return objective->mse(body(law), velocities(), frames).item<double>();
+    return objective->mse(body(law), {velocities()}, frames).item<double>();
   }
 };
 
@@ -84,7 +84,7 @@ TEST(MotionObjective, UnevenFramesAreComparedWithTheirOwnStates) {
   const auto all = p.objective->frame_mse(law, p.motion, 41);
   double expected = 0;
   for (const std::ptrdiff_t f : kept) expected += all[f] / 5;
-  const double found = objective->mse(p.body(law), p.velocities(), 5).item<double>();
+  const double found = objective->mse(p.body(law), {p.velocities()}, 5).item<double>();
   EXPECT_GT(found, 0);
   EXPECT_NEAR(found, expected, 1e-12 * expected);
 }
@@ -114,7 +114,7 @@ TEST(MotionObjective, ATimeBetweenTwoStepsLiesOnTheLineBetweenTheirPositions) {
     EXPECT_NEAR(x[2][k], 0.25 * states[11][k] + 0.75 * states[12][k], 1e-14);
   }
   // The tensor of the op is the same.
-  const Tensor r = objective->residuals(p.body(law), p.velocities(), 4);
+  const Tensor r = objective->residuals(p.body(law), {p.velocities()}, 4);
   for (int f = 1; f < 4; ++f) {
     const Tensor found = r[f] + to_tensor({some.positions(f), some.positions(f) + x[f].size()});
     EXPECT_LE((found - to_tensor(x[f])).abs().max().item<double>(), 1e-14) << f;
@@ -141,7 +141,7 @@ TEST(MotionObjective, TrackedPointsFollowTheBody) {
   const auto objective = [&] { return make_motion_objective(points, p.steps, p.grid, "float64"); };
   const Tensor all = torch::cat({p.velocities(), torch::zeros({points.points(), 3})});
   const auto mse = [&](const kernels::LawDescription& law) {
-    return objective()->mse(p.body(law), all, 41).item<double>();
+    return objective()->mse(p.body(law), {all}, 41).item<double>();
   };
   EXPECT_LT(mse(testing::elastic_body()), 1e-28);
   const auto law = testing::elastic_body(3e4, 2e4);
@@ -149,7 +149,7 @@ TEST(MotionObjective, TrackedPointsFollowTheBody) {
   EXPECT_NEAR(mean_of_first(objective()->frame_mse(law, p.motion, 41), 41), seen, 1e-12 * seen);
   // What is hidden counts nowhere, and the mean is over what is left.
   std::vector<double> square(41 * points.points());
-  const Tensor r = objective()->residuals(p.body(law), all, 41);
+  const Tensor r = objective()->residuals(p.body(law), {all}, 41);
   double expected = 0, count = 0;
   for (std::int64_t f = 0; f < 41; ++f) {
     for (std::int64_t q = 0; q < points.points(); ++q) {
@@ -175,7 +175,7 @@ TEST(MotionObjective, TrackedPointsStepByStepAreTheSame) {
   for (const char* rollout : {"fused", "stepwise"}) {
     const Tensor v = start.clone().requires_grad_();
     make_motion_objective(points, p.steps, p.grid, "float64", rollout)
-        ->mse(p.body(law), v, 20)
+        ->mse(p.body(law), {v}, 20)
         .backward();
     found.push_back(v.grad());
   }
@@ -212,9 +212,9 @@ double gradient_error(const Problem& p, const Tensor& parameters,
                       const kernels::LawDescription& law, const std::vector<double>& steps,
                       std::ptrdiff_t frames) {
   const Tensor leaf = parameters.clone().requires_grad_();
-  p.objective->mse(p.body(law, leaf), p.velocities(), frames).backward();
+  p.objective->mse(p.body(law, leaf), {p.velocities()}, frames).backward();
   const auto value = [&](const std::vector<double>& w) {
-    return p.objective->mse(p.body(law, to_tensor(w)), p.velocities(), frames).item<double>();
+    return p.objective->mse(p.body(law, to_tensor(w)), {p.velocities()}, frames).item<double>();
   };
   const std::vector<double> at(leaf.data_ptr<double>(), leaf.data_ptr<double>() + leaf.numel());
   const auto expected = testing::central_differences(value, at, steps);
@@ -230,11 +230,11 @@ TEST_P(EachRollout, GradientOfAnalyticParametersAndOfTheVelocity) {
             1e-7);
   const Tensor v = p.velocities().requires_grad_();
   const auto law = testing::elastic_body(2.4e4, 2.5e4);
-  p.objective->mse(p.body(law), v, 30).backward();
+  p.objective->mse(p.body(law), {v}, 30).backward();
   torch::manual_seed(5);
   const Tensor direction = torch::randn_like(v);
   const auto value = [&](const std::vector<double>& t) {
-    return p.objective->mse(p.body(law), v.detach() + t[0] * direction, 30).item<double>();
+    return p.objective->mse(p.body(law), {v.detach() + t[0] * direction}, 30).item<double>();
   };
   const double found = (direction * v.grad()).sum().item<double>();
   const double expected = testing::central_differences(value, {0}, {1e-5})[0];
@@ -251,7 +251,7 @@ TEST(MotionObjective, GradientOfTheLatentCodeThroughTheFitVariables) {
   std::vector<double> u = truth;
   for (double& x : u) x += 0.2;
   const auto mse = [&](const Tensor& at) {
-    return p.objective->mse(variables->body(at, p.observation.particles), p.velocities(), 41);
+    return p.objective->mse(variables->body(at, p.observation.particles), {p.velocities()}, 41);
   };
   const Tensor leaf = to_tensor(u).requires_grad_();
   mse(leaf).backward();

@@ -56,6 +56,7 @@ TEST(Observation, TrackedPointsAndTheirBodyReadBack) {
   written.volume = {1e-6, 2e-6, 3e-6};
   written.tracers.assign(written.x.begin(), written.x.begin() + 6);
   written.noise = 1e-3;
+  written.start_degree = 2;
   for (int k = 0; k < 3; ++k) written.x[9 + k] = std::nan("");  // point 1 in frame 1
   write_observation(scratch.file("o.h5"), written);
   const Observation read = read_observation(scratch.file("o.h5"));
@@ -66,6 +67,7 @@ TEST(Observation, TrackedPointsAndTheirBodyReadBack) {
   EXPECT_EQ(read.start(), written.body);
   EXPECT_EQ(read.tracers, written.tracers);
   EXPECT_EQ(read.noise, 1e-3);
+  EXPECT_EQ(read.start_degree, 2);
   EXPECT_FALSE(read.is_seen(1, 1));
   EXPECT_TRUE(read.is_seen(1, 0));
   EXPECT_EQ(read.positions(2)[0], 0.12);
@@ -120,6 +122,8 @@ TEST(Observation, ImpossibleValuesAreRefused) {
       {"o.h5: /volume: expected volumes > 0, found 0", [](Observation& o) { o.volume[0] = 0; }},
       {"o.h5: /x: expected 18 numbers for the shape [3, 2, 3], found 17",
        [](Observation& o) { o.x.pop_back(); }},
+      {"o.h5: attribute start_degree of /x: expected 0 to 3, found 4",
+       [](Observation& o) { o.start_degree = 4; }},
       {"o.h5: /x: expected at least two frames of one point, found 1 of 2",
        [](Observation& o) { o.frames = 1; }},
   };
