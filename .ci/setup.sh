@@ -5,6 +5,7 @@ set -euo pipefail
 packages=(
   build-essential cmake ninja-build ccache
   libtorch-dev libopenblas-dev libeigen3-dev libxsimd-dev
+  libnanoflann-dev  # k-d trees of the clouds that an observation is compared with
   libhdf5-dev zlib1g-dev libyaml-cpp-dev nlohmann-json3-dev
   libcli11-dev libspdlog-dev libfmt-dev
   libgtest-dev libgmock-dev libbenchmark-dev
