@@ -57,21 +57,23 @@ void run(const uniphy::ObservationSource& observed, const uniphy::FitVariablesSo
   write_latent(out.file("latent.h5"),
                latent_of(result, observation, *variables, model, out.config_yaml()));
   write_trajectory(out.file("trajectory.h5"), result.fitted);
-  out.draw("loss.png", loss_chart(result.fit, *variables, "Inference"));
+  if (!result.fit.history.empty())
+    out.draw("loss.png", loss_chart(result.fit, *variables, "Inference"));
   write_misfit(out.file("residual.csv"), result.misfit);
   out.draw("residual.png", misfit_chart(result.misfit));
   const Trajectory seen = observed_trajectory(result.seen);
-  plot_particles(out.file("frames.png"),
-                 frames_picture({{"observed", &seen}, {"fitted", &result.fitted}}, 5));
+  plot_particles(
+      out.file("frames.png"),
+      frames_picture({{"observed", &seen}, {"fitted", &result.fitted}}, 5, observation.cloud > 0));
   show(result, *variables, out.report());
   add_metrics(metrics, result, observation, *variables);
   std::error_code ignored;
   std::filesystem::remove(hooks.state_file, ignored);  // a finished fit is not resumed
   std::filesystem::remove(adaptation_state_file(hooks.state_file), ignored);
 
-  std::printf("fit_mse %.3e m^2, root/size %.3f %%, best start %.3e m^2, %zu roll-outs\n",
+  std::printf("fit_mse %.3e m^2, root/size %.3f %%, best start %.3e m^2, %d roll-outs\n",
               result.fit_mse, 100 * *metrics.find("fit_root_over_size"), result.best_start,
-              result.fit.history.size());
+              result.roll_outs);
   std::fputs(rung_table(result.rung, result.rungs).c_str(), stdout);
   std::fputs(fit_summary(result.fit, *variables).c_str(), stdout);
   if (result.fit.determined) {
@@ -108,7 +110,8 @@ int main(int argc, char** argv) {
       {"DIR/latent.h5       the fitted material (layout: uniphy/io/latent_file.hpp)",
        "DIR/model.h5        the adapted law that latent.h5 belongs to, where z alone did not do",
        "DIR/trajectory.h5   its roll-out at the observed frames, trajectory.xdmf for ParaView",
-       "DIR/loss.png        loss of every candidate", "DIR/frames.png      observed and fitted",
+       "DIR/loss.png        loss of every candidate, where gradients were followed",
+       "DIR/frames.png      observed and fitted",
        "DIR/residual.csv    what the fitted law leaves over time, residual.png the same as a chart",
        "DIR/state.h5        while it runs: where it can be resumed, with adaptation_state.h5"},
       {"uniphy_simulate configs/simulate/benchmark_cube.yaml --set output.observation=true --set "

@@ -22,7 +22,7 @@ int main(int argc, char** argv) {
   const uniphy::ExperimentInfo info{
       "uniphy_observe",
       "Makes of an observation that shows everything what a laboratory would see: a part of the "
-      "points, some of the frames, noise, hidden points.",
+      "points or clouds without correspondence, some of the frames, noise, hidden points.",
       {"CONFIG.yaml         what is seen",
        "observation.h5      as uniphy_simulate writes it with output.observation=true"},
       {"DIR/observation.h5  what is left of it (layout: uniphy/io/observation.hpp)"},
@@ -39,6 +39,10 @@ int main(int argc, char** argv) {
                                  "the first frame beside them");
         view.hidden = points.real("hidden", 0, between(0, 0.99), "",
                                   "share of their positions that is hidden, drawn");
+        uniphy::Section cloud = config.section("cloud", "in place of tracked points");
+        view.cloud = cloud.integer("points", 0, between(0, 1e9), "",
+                                   "of each frame, drawn anew and in any order, without "
+                                   "correspondence; 0: the points are tracked");
         uniphy::Section frames = config.section("frames", "when they are seen");
         view.first = frames.integer("first", 0, between(0, 1e9), "",
                                     "number of the first one; where the body is deformed in it, "

@@ -20,6 +20,7 @@ Observation judged(const JudgedMotion& motion, const Observation& from) {
   all.tracers = from.tracers;
   if (motion.truth.empty()) return all;
   all.tracers.clear();
+  all.cloud = 0;
   all.x = motion.truth;
   return all;
 }
@@ -52,9 +53,7 @@ Forecast forecast(const JudgedMotion& motion, const FitVariables& variables,
   f.explained = result.explained;
   if (result.fit.determined) f.nearest = variables.nearest(result.fit.u, 1).front().code;
   f.material = result.material.reading.material;
-  f.roll_outs = static_cast<double>(result.fit.history.size());
-  if (!result.rungs.empty()) f.roll_outs = 0;
-  for (const RungReport& r : result.rungs) f.roll_outs += r.roll_outs;
+  f.roll_outs = result.roll_outs;
   f.forecast = second_half(motion, result.seen, result.fit.law, result.fit.motion, options.dtype);
   return f;
 }

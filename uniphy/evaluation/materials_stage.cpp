@@ -53,7 +53,7 @@ MaterialsOptions read_options(Section& config) {
     if (std::find(materials.begin(), materials.end(), m.name()) != materials.end())
       draw.materials.push_back(m);
   }
-  const std::vector<std::string> all(std::begin(kOpenWorldCases), std::end(kOpenWorldCases) - 2);
+  const std::vector<std::string> all(std::begin(kOpenWorldCases), std::end(kOpenWorldCases) - 3);
   for (const std::string& name :
        config.choices("cases", std::vector<std::string>{"closed", "noise"}, all,
                       "how they are observed, as in open_world", at_least(1))) {

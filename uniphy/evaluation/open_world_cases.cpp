@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 
 #include "ops/kernels/base/error.hpp"
@@ -83,6 +84,10 @@ LaboratoryView view_of(OpenWorldCase c, double noise, std::uint64_t seed) {
     view.says_noise = false;  // it can be estimated
     return view;
   }
+  if (c == OpenWorldCase::cloud) {
+    view.stride = 2;
+    return view;
+  }
   view.share = 0.1;
   view.stride = 10;
   if (c == OpenWorldCase::hidden) view.hidden = 1.0 / 3;
@@ -100,6 +105,7 @@ OpenWorldMotion open_world_motion(const OutsideScene& scene, const kernels::LawD
   LaboratoryView view = view_of(c, noise, seed);
   OpenWorldMotion result;
   if (c == OpenWorldCase::deformed) view.first = whole.frames / kDeformedAfter;
+  if (c == OpenWorldCase::cloud) view.cloud = std::max<std::int64_t>(1, whole.particles / 2);
   result.motion.seen = laboratory_view(whole, view);
   result.motion.name =
       fmt::format("{} in {}, {}", kernels::law_name(law.id), scene.name, case_name(c));

@@ -17,11 +17,13 @@ enum class OpenWorldCase {
   hidden,   ///< the same, and a third of their positions hidden
   finer,    ///< all particles, from a grid twice as fine with a quarter of the time step and eight
             ///< times the particles, of which means of 2×2×2 are seen; a cube alone
+  cloud,  ///< half of the particles as a cloud without correspondence, others in every frame, with
+          ///< noise, every other frame
   deformed  ///< all particles, from a fifth of the time on, at which the body has met the floor;
             ///< its state there is fitted as polynomials of degree 2
 };
-inline constexpr const char* kOpenWorldCases[] = {"closed", "noise", "tracked",
-                                                  "hidden", "finer", "deformed"};
+inline constexpr const char* kOpenWorldCases[] = {"closed", "noise", "tracked", "hidden",
+                                                  "finer",  "cloud", "deformed"};
 const char* case_name(OpenWorldCase c);
 /// How a laboratory sees a motion in a case; noise: standard deviation of a coordinate over the
 /// size of the body. Of `finer` and `deformed`, the view of the closed world.

@@ -71,7 +71,8 @@ class Ladder {
         fitted_frames_(fitted_frames),
         fits_starts_(fits_starts),
         deformed_(observation.start_degree > 0),
-        from_ends_(fits_starts_ || deformed_),
+        clouds_(observation.cloud > 0),
+        from_ends_(fits_starts_ || deformed_ || clouds_),
         fitter_(observation_, name, latent, options, adaptation, hooks),
         noise_(observed_noise(observation) / fitter_.size()),
         enough_(std::hypot(adaptation.enough, (fits_starts ? kNoiseAllowance : 2) * noise_)) {}
@@ -136,8 +137,10 @@ class Ladder {
     const int rounds = from_ends_ ? kStartRounds : converged ? 0 : 1;
     FitEnd end = result_.fit.ends.front();
     if (from_ends_) {
+      fitter_.set_detail(CloudDetail::rough);
       const SettledEnd best =
           best_end(fitter_, part_, result_.fit.ends, fitted_horizons(), least_pull(), fits_starts_);
+      fitter_.set_detail(CloudDetail::all);
       end = best.end;
       take_starts(best.seen);
     }
@@ -182,7 +185,7 @@ class Ladder {
   }
 
   FitOptions schedule() const {
-    if (deformed_) return schedule_of_starts(options_);
+    if (deformed_ || clouds_) return schedule_of_starts(options_);
     return fits_starts_ ? schedule_to_ends(options_) : options_;
   }
 
@@ -216,6 +219,7 @@ class Ladder {
     fit.motion = fitter_.motion();
     fit.mse = c.fitted * c.fitted * fitter_.size() * fitter_.size();
     add_posterior(Rung::latent, c.point);
+    count_roll_outs();
     return result_;
   }
 
@@ -352,6 +356,11 @@ class Ladder {
     fit.mse = root * root * fitter_.size() * fitter_.size();
     add_posterior(rung, last.point);
     result_.rungs = fitter_.reports();
+    count_roll_outs();
+  }
+
+  void count_roll_outs() {
+    for (const RungReport& r : fitter_.reports()) result_.roll_outs += r.roll_outs;
   }
 
   Observation observation_;  ///< with the starts that were found
@@ -364,6 +373,7 @@ class Ladder {
   const std::ptrdiff_t fitted_frames_;
   const bool fits_starts_;
   const bool deformed_;   ///< at the first frame
+  const bool clouds_;     ///< without correspondence
   const bool from_ends_;  ///< of gradients, least squares race: best_end
   RungFitter fitter_;
   double noise_, enough_;   ///< over size
@@ -379,8 +389,9 @@ Adaptation adapt(const Observation& observation, const std::string& name,
   const FitProblem problem(observation, name, variables, options);
   const std::ptrdiff_t frames = observation.frames, contact = problem.contact();
   std::ptrdiff_t fitted = frames;
-  const bool deformed = observation.start_degree > 0;  // what is left is its start's: no more laws
-  if (adaptation.rungs.size() > 1 && can_be_adapted(variables) && !deformed) {
+  // What is left is of the polynomials of a deformed start, or of clouds: no reason for more laws.
+  const bool by_code = observation.start_degree > 0 || observation.cloud > 0;
+  if (adaptation.rungs.size() > 1 && can_be_adapted(variables) && !by_code) {
     fitted = std::min(horizon_frames(1 - adaptation.kept, contact, frames), frames - 1);
   }
   const bool climbs = fitted < frames && contact < fitted;
@@ -388,6 +399,7 @@ Adaptation adapt(const Observation& observation, const std::string& name,
     Adaptation result;
     result.fit = fit_observation(observation, name, variables, options, hooks);
     result.seen = observation;
+    result.roll_outs = static_cast<int>(result.fit.history.size()) + variables.starts();
     return result;
   }
   return Ladder(observation, name, variables, options, adaptation, hooks, climbs ? fitted : frames,

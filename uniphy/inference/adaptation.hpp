@@ -32,6 +32,7 @@ struct Adaptation {
   FitResult fit;  ///< of the rung chosen; its u is that of the latent variables
   Rung rung = Rung::latent;
   std::vector<RungReport> rungs;  ///< those that were tried; empty where nothing was kept
+  int roll_outs = 0;              ///< of all that was tried, with gradients or without
   /// What was observed with the starts of its points where they were found to be, see
   /// StartCorrection.
   Observation seen;
@@ -71,7 +72,9 @@ struct Adaptation {
 ///
 /// Where the body is deformed at the first frame (Observation::start_degree), its velocity and
 /// stretch there are fitted with z from the best starts of each material, which race in the same
-/// way; the law is not adapted then, since what is left is of the polynomials.
+/// way; the law is not adapted then, since what is left is of the polynomials. Of clouds without
+/// correspondence it is the same, with the velocity alone; the race compares a part of their points
+/// (CloudDetail::rough).
 ///
 /// Analytic variables have no rung but `latent`; where that is the only one, all frames are fitted.
 /// Without a contact it is fit_observation alone. Resumes like it, with adaptation_state_file()

@@ -62,6 +62,7 @@ FitOptions schedule_of_starts(FitOptions options) {
   FitStage last = options.stages.back();
   last.epochs = 0;
   last.candidates = kStarts;
+  options.detail = CloudDetail::rough;
   options.stages = {last};
   return options;
 }

@@ -13,8 +13,9 @@ namespace uniphy {
 /// only ranks what the one before has reached.
 FitOptions schedule_to_ends(FitOptions options);
 
-/// The schedule where the first frame is deformed and gradients would take that for the law's: all
-/// starts, undeformed, are ranked over all frames, and the best of each material are the ends.
+/// The schedule where the first frame is deformed and gradients would take that for the law's, and
+/// of clouds, whose gradients take several roll-outs' time: all starts are ranked over all frames,
+/// and the best of each material are the ends.
 FitOptions schedule_of_starts(FitOptions options);
 
 /// An end with what was observed, the starts of its points where its law has them.

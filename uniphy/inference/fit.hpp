@@ -30,9 +30,10 @@ struct FitStage {
 struct FitOptions {
   std::string dtype = "float32";
   std::string rollout = "fused";  ///< or stepwise, see make_motion_objective
-  double prior = 0;               ///< weight of ‖z‖²/σ² against mse/size²
-  double prior_sigma = 1;         ///< σ
-  double pull = 0;                ///< weight of FitVariables::departure, likewise
+  CloudDetail detail = CloudDetail::all;
+  double prior = 0;        ///< weight of ‖z‖²/σ² against mse/size²
+  double prior_sigma = 1;  ///< σ
+  double pull = 0;         ///< weight of FitVariables::departure, likewise
   double clip = 10;
   int patience = 8;  ///< a candidate is left as it is after so many evaluations without 1 % gained
   std::vector<FitStage> stages;  ///< the last one has horizon 1

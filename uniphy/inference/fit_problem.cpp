@@ -61,17 +61,19 @@ FitProblem::FitProblem(const Observation& observation, const std::string& name,
       contact_(first_contact(observation, steps_, grid_, motion_)),
       noise_(observed_noise(observation)),
       fits_velocity_(observation.tracked() || noise_ > kNoisy * size_ ||
-                     observation.start_degree > 0),
-      fits_starts_(observation.tracked() || noise_ > kNoisyStarts * size_),
+                     observation.start_degree > 0 || observation.cloud > 0),
+      fits_starts_(observation.cloud == 0 &&
+                   (observation.tracked() || noise_ > kNoisyStarts * size_)),
       basis_(starts_of(observation), observation.particles, motion_),
       observed_(numbers_of(motion_)),
       units_(units_of(motion_.degree)),
-      objective_(
-          make_motion_objective(observation, steps_, grid_, options.dtype, options.rollout)) {
+      objective_(make_motion_objective(observation, steps_, grid_, options.dtype, options.rollout,
+                                       options.detail)) {
   if (options.stages.empty() || options.stages.back().horizon < 1) {
     throw Error("stages: expected a last stage with horizon 1");
   }
   kernels::make_law<double>(variables.law(variables.start(0)));  // a model that does not fit: now
+  if (observation.cloud > 0) return;
   const Tensor hidden = torch::tensor(observation.x, torch::kFloat64).isnan();
   if (hidden.any().item<bool>()) hidden_ = hidden.view({observation.frames, -1});
 }
@@ -152,10 +154,10 @@ StartCorrection FitProblem::start_correction(const Tensor& point, std::ptrdiff_t
 Tensor FitProblem::residuals(const Tensor& point, std::ptrdiff_t frames,
                              const StartCorrection* starts) const {
   const torch::NoGradGuard no_grad;
-  const std::int64_t P = observation_.points(), all = 3 * P * frames;
   try {
     Tensor r = misses(point, frames);
     if (starts != nullptr) r = starts->remaining(r);
+    const std::int64_t P = r.size(1) / 3, all = r.numel();
     r = r.view({frames, P, 3});
     const std::int64_t most = most_residuals(point.numel());
     const std::int64_t stride = (all + most - 1) / most;

@@ -90,6 +90,11 @@ ObservationSource read_observation_source(Section& config) {
   source.noise = config.real("noise", 0, between(0, 1), "m",
                              "standard deviation of a coordinate; 0: what the observation says, "
                              "else estimated from it");
+  source.cloud_distance = config.choice(
+      "cloud_distance", std::string("transport"), {"transport", "chamfer", "nearest"},
+      "of clouds without correspondence: debiased entropic optimal transport, for clouds that show "
+      "the whole body; two-sided Chamfer; or the distance of the points of a cloud from the body "
+      "alone, where it shows a part of it, as its surface");
   source.start_degree = static_cast<int>(config.integer(
       "start_degree", -1, between(-1, kMostStartDegree), "",
       "0: at the first frame the body is undeformed and moves as a rigid one; 1 to 3: it is "
@@ -110,7 +115,13 @@ ObservationSource read_observation_source(Section& config) {
 Observation ObservationSource::load(std::vector<std::string>& warnings) const {
   Observation seen = at_resolution(read_observation(file), resolution, file.string(), warnings);
   if (noise > 0) seen.noise = noise;
+  seen.cloud_distance = cloud_distance;
   if (start_degree >= 0) seen.start_degree = start_degree;
+  if (seen.cloud > 0 && seen.start_degree > 0) {
+    throw Error(
+        fmt::format("{}: start_degree: expected 0 for clouds without correspondence, found {}",
+                    file.string(), seen.start_degree));
+  }
   return seen;
 }
 

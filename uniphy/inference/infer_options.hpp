@@ -20,7 +20,8 @@ FitOptions read_fit_options(Section& config);
 struct ObservationSource {
   std::filesystem::path file;
   Resolution resolution;
-  double noise = 0;       ///< m, takes the place of what the file says; 0: nothing does
+  double noise = 0;  ///< m, takes the place of what the file says; 0: nothing does
+  std::string cloud_distance = "transport";  ///< Observation::cloud_distance
   int start_degree = -1;  ///< Observation::start_degree in place of the file's; −1: that
 
   /// Reads the file and fills the body where it has to be; adds what was mended in its surface to
@@ -28,7 +29,7 @@ struct ObservationSource {
   Observation load(std::vector<std::string>& warnings) const;
 };
 
-/// Declares and reads the keys observation, noise, start_degree and resolution.
+/// Declares and reads the keys observation, noise, cloud_distance, start_degree and resolution.
 ObservationSource read_observation_source(Section& config);
 
 /// What is fitted: the latent code of a model, or the parameters of an analytic law.

@@ -7,9 +7,11 @@
 #include <limits>
 #include <map>
 #include <numeric>
+#include <optional>
 
 #include "ops/kernels/base/for_each.hpp"
 #include "ops/kernels/base/hash.hpp"
+#include "ops/kernels/loss/nearest_points.hpp"
 #include "uniphy/inference/fit_findings.hpp"
 #include "uniphy/inference/observed_motion.hpp"
 #include "uniphy/inference/reading_error.hpp"
@@ -48,12 +50,26 @@ MaterialBelief read_inference(const Inference& inference, const Adaptation& adap
                               const FitVariables& variables, double strain) {
   const FitResult& fit = inference.fit;
   const double dt = inference.seen.dt;
+  const double duration = inference.seen.time.back() - inference.seen.time.front();
   std::vector<MaterialReading> samples(adapted.samples.size());
   kernels::for_each(static_cast<std::ptrdiff_t>(samples.size()), [&](std::ptrdiff_t i) {
-    samples[i] = read_material(adapted.samples[i], dt, strain);
+    samples[i] = read_material(adapted.samples[i], dt, strain, duration);
   });
-  const MaterialBelief belief = material_belief(read_material(fit.law, dt, strain), samples);
+  const MaterialBelief belief =
+      material_belief(read_material(fit.law, dt, strain, duration), samples);
   return with_reading_error(belief, reading_error(variables, belief.reading.material, dt, strain));
+}
+
+/// Of the points that are fitted at the observed frames, without positions.
+Trajectory unfilled_trajectory(const Observation& observation) {
+  Observation points = observation;
+  if (points.cloud > 0) {  // of the particles, then
+    points.cloud = 0;
+    points.x = points.body;
+  }
+  Trajectory t = observed_trajectory(points);
+  t.x.clear();
+  return t;
 }
 
 }  // namespace
@@ -65,7 +81,7 @@ Trajectory observed_trajectory(const Observation& observation) {
   t.particles = points;
   t.body.assign(points, 0);
   t.volume = observation.volume;
-  if (observation.tracked()) {
+  if (points != observation.particles || observation.tracked()) {
     const double all = std::accumulate(t.volume.begin(), t.volume.end(), 0.0);
     t.volume.assign(points, all / static_cast<double>(points));
   }
@@ -88,11 +104,11 @@ Inference infer(const Observation& observation, const std::string& name,
   result.fit = adapted.fit;
   result.rung = adapted.rung;
   result.rungs = adapted.rungs;
+  result.roll_outs = adapted.roll_outs;
   result.seen = adapted.seen;
   const Observation& seen = result.seen;
   result.size = observed_size(seen);
-  result.fitted = observed_trajectory(seen);
-  result.fitted.x.clear();
+  result.fitted = unfilled_trajectory(seen);
   const ObservedSteps steps = observed_steps(seen, name);
   const kernels::GridSettings grid = observed_grid(seen, name);
   result.check = check_observation(seen, steps, grid, observed_motion(seen, steps, grid));
@@ -101,7 +117,9 @@ Inference infer(const Observation& observation, const std::string& name,
                       [&](std::ptrdiff_t, const std::vector<double>& x) {
                         result.fitted.x.insert(result.fitted.x.end(), x.begin(), x.end());
                       });
-  result.misfit = misfit_of(seen, result.fitted, adaptation.tolerance, adapted.starts_fitted);
+  result.misfit = seen.cloud > 0
+                      ? misfit_of_clouds(seen, result.fitted, adaptation.tolerance)
+                      : misfit_of(seen, result.fitted, adaptation.tolerance, adapted.starts_fitted);
   result.fit_mse = std::pow(result.misfit.over_size * result.size, 2);
   result.best_start = *std::min_element(result.fit.start_mse.begin(), result.fit.start_mse.end());
   result.explained = explains(result);
@@ -266,25 +284,28 @@ Chart loss_chart(const FitResult& fit, const FitVariables& variables, const std:
 }
 
 ParticlePicture frames_picture(const std::vector<std::pair<std::string, const Trajectory*>>& rows,
-                               int columns) {
+                               int columns, bool clouds) {
   ParticlePicture picture;
   picture.columns = columns;
   picture.colour_label = kHeightInBody;
   for (const auto& [name, trajectory] : rows) {
     // The last row has all that may be hidden in the others.
-    const Trajectory& whole =
-        rows.back().second->particles == trajectory->particles ? *rows.back().second : *trajectory;
+    const Trajectory& last = *rows.back().second;
+    const bool cloud = clouds && trajectory != &last;
+    const Trajectory& whole = cloud || last.particles == trajectory->particles ? last : *trajectory;
     const std::vector<double> heights =
         heights_in_body({whole.positions(0), whole.positions(0) + 3 * whole.particles});
     for (int c = 0; c < columns; ++c) {
       const std::int64_t frame = (trajectory->frames - 1) * c / std::max(1, columns - 1);
       ParticlePanel panel;
       panel.caption = fmt::format("{} {:.0f} ms", name, 1e3 * trajectory->time[frame]);
+      std::optional<kernels::NearestPoints> tree;
+      if (cloud) tree.emplace(last.positions(frame), static_cast<std::size_t>(last.particles));
       for (std::int64_t p = 0; p < trajectory->particles; ++p) {
         const double* x = trajectory->positions(frame) + 3 * p;
         if (std::isnan(x[0])) continue;
         panel.x.insert(panel.x.end(), x, x + 3);
-        panel.colour.push_back(heights[p]);
+        panel.colour.push_back(heights[tree ? tree->nearest(x) : p]);
       }
       picture.panels.push_back(std::move(panel));
     }
@@ -298,7 +319,9 @@ Playback fit_playback(const Inference& inference, const std::string& title) {
   fitted.F = inference.deformation;
   const double wall = inference.seen.bound / double(inference.seen.grid);
   return {title,
-          {motion_of("observed", seen), motion_of("fitted", fitted, "observed", seen)},
+          {motion_of("observed", seen), inference.seen.cloud > 0
+                                            ? motion_of("fitted", fitted)
+                                            : motion_of("fitted", fitted, "observed", seen)},
           {},
           wall,
           1 - wall};
@@ -316,7 +339,8 @@ std::string fit_fingerprint(const Observation& observation, const FitVariables& 
                        observation.gravity[0], observation.gravity[1], observation.gravity[2],
                        observation.walls, observation.bound));
   hash.add(std::vector<double>{observation.density, observation.noise,
-                               double(observation.start_degree)});
+                               double(observation.start_degree), double(observation.cloud)});
+  hash.add(observation.cloud_distance);
   for (int i = 0; i < variables.starts(); ++i) hash.add(variables.start(i));
   add_weights(hash, variables.law(variables.start(0)));
   hash.add(text);

@@ -29,6 +29,7 @@ struct Inference {
   double size = 0;                ///< m, largest side of the observed body
   double best_start = 0;          ///< m², what the best start reaches over all frames
   ObservationCheck check;         ///< whether the observation is what the fit takes it for
+  int roll_outs = 0;              ///< of all that was tried, with gradients or without
   Rung rung = Rung::latent;       ///< how far the law was adapted
   std::vector<RungReport> rungs;  ///< see Adaptation
   Misfit misfit;                  ///< of `fitted`
@@ -81,9 +82,11 @@ void add_metrics(Metrics& metrics, const Inference& inference, const Observation
 /// The best mse so far of every start that was followed, over the roll-outs of all stages.
 Chart loss_chart(const FitResult& fit, const FitVariables& variables, const std::string& title);
 
-/// `columns` frames of several trajectories of the same number of frames, one row each.
+/// `columns` frames of several trajectories of the same number of frames, one row each. Points are
+/// coloured by their height in the first frame; those of `clouds`, which all but the last row are
+/// then, as the nearest point of the last row.
 ParticlePicture frames_picture(const std::vector<std::pair<std::string, const Trajectory*>>& rows,
-                               int columns);
+                               int columns, bool clouds = false);
 
 /// Observed and fitted side by side, for a report.
 Playback fit_playback(const Inference& inference, const std::string& title);

@@ -25,6 +25,9 @@ constexpr double kSandShare = 0.2;
 /// Share of what exceeds the yield strain that is left after a step, from which a flow has a rate.
 /// A choice: the two families meet where a non-Newtonian body's viscosity is small.
 constexpr double kFlowShare = 0.03;
+/// Share of that excess which has to flow off while a body is observed, for a flow. A choice: of
+/// the non-Newtonian bodies of the families, it does within a millisecond.
+constexpr double kFlowSeen = 0.1;
 /// 1/s, of shear.
 constexpr double kRate = 10;
 
@@ -106,7 +109,7 @@ void read_fluid(const Probe& probe, double bulk, MaterialReading& m) {
 }
 
 /// Of a solid whose moduli are known.
-void read_yield(const Probe& probe, double dt, MaterialReading& m) {
+void read_yield(const Probe& probe, double dt, double duration, MaterialReading& m) {
   const double pressed = probe.yield_strain(kPressed, m.strain_seen);
   const double free = probe.yield_strain(kUnpressed, m.strain_seen);
   m.material = "elastic";
@@ -126,9 +129,10 @@ void read_yield(const Probe& probe, double dt, MaterialReading& m) {
         s0 * (3 - std::sin(m.friction_angle)) / (2 * std::sqrt(6.0) * std::cos(m.friction_angle));
     return;
   }
+  const double excess = 0.5 * free, kept = (probe.left(free + excess, 0) - free) / excess;
+  if (std::pow(kept, duration / dt) > 1 - kFlowSeen) return;
   const Probe::Answer at = probe.at(Probe::shear(free, 0));
   m.yield_stress = (at.tau - at.tau.trace() / 3 * Matrix3d::Identity()).norm();
-  const double excess = 0.5 * free, kept = (probe.left(free + excess, 0) - free) / excess;
   m.material = kept < kFlowShare ? "plasticine" : "non_newtonian";
   if (kept < kFlowShare) return;
   // What is left of the excess is 1/(1 + 2 μ̂ Δt/η), μ̂ = μ/3 tr Σ².
@@ -139,7 +143,8 @@ void read_yield(const Probe& probe, double dt, MaterialReading& m) {
 
 }  // namespace
 
-MaterialReading read_material(const kernels::LawDescription& law, double dt, double strain) {
+MaterialReading read_material(const kernels::LawDescription& law, double dt, double strain,
+                              double duration) {
   MaterialReading m;
   m.strain_seen = std::clamp(strain, 1e-6, 2.0);
   const Probe probe(law, dt);
@@ -153,7 +158,7 @@ MaterialReading read_material(const kernels::LawDescription& law, double dt, dou
   m.lambda = bulk - 2 * m.mu / 3;
   m.young = 9 * bulk * m.mu / (3 * bulk + m.mu);
   m.poisson = (3 * bulk - 2 * m.mu) / (2 * (3 * bulk + m.mu));
-  read_yield(probe, dt, m);
+  read_yield(probe, dt, duration, m);
   return m;
 }
 

@@ -28,8 +28,11 @@ struct MaterialReading {
 };
 
 /// Probes the law at a time step: small strains, then shear up to `strain_seen` (the norm of the
-/// deviator of log Σ) at pressures down to none, then a rate of shear.
-MaterialReading read_material(const kernels::LawDescription& law, double dt, double strain_seen);
+/// deviator of log Σ) at pressures down to none, then a rate of shear. A solid that yields, but of
+/// whose excess over that next to nothing flows off within `duration` (s, what was observed), is
+/// called elastic.
+MaterialReading read_material(const kernels::LawDescription& law, double dt, double strain_seen,
+                              double duration = std::numeric_limits<double>::infinity());
 
 /// The norm of the deviator of log Σ that all but the last per mille of the deformation gradients
 /// F [count, 9] stay below.

@@ -1,10 +1,12 @@
 #include "uniphy/inference/misfit.hpp"
 
 #include <fmt/format.h>
+#include <torch/torch.h>
 
 #include <algorithm>
 #include <cmath>
 
+#include "uniphy/inference/cloud_comparison.hpp"
 #include "uniphy/inference/observed_motion.hpp"
 #include "uniphy/inference/observed_noise.hpp"
 #include "uniphy/io/atomic_file.hpp"
@@ -53,16 +55,26 @@ void find_block(const Observation& seen, const std::vector<double>& square, Misf
   misfit.block_root = std::sqrt(mean(worst));
 }
 
+Misfit begin_misfit(const Observation& seen, double tolerance, double allowance) {
+  Misfit m;
+  m.time = seen.time;
+  const double noise = allowance * observed_noise(seen) / observed_size(seen);
+  m.allowed = std::hypot(tolerance, noise);
+  m.allowed_ahead = std::hypot(kForecastAllowance * tolerance, noise);
+  return m;
+}
+
+void find_growth(Misfit& m) {
+  m.grows = static_cast<std::int64_t>(m.root.size());
+  while (m.grows > 0 && m.root[m.grows - 1] > m.allowed) --m.grows;
+}
+
 }  // namespace
 
 Misfit misfit_of(const Observation& seen, const Trajectory& fitted, double tolerance,
                  bool starts_fitted) {
   const double size = observed_size(seen);
-  Misfit m;
-  m.time = seen.time;
-  const double noise = (starts_fitted ? kNoiseAllowance : 2) * observed_noise(seen) / size;
-  m.allowed = std::hypot(tolerance, noise);
-  m.allowed_ahead = std::hypot(kForecastAllowance * tolerance, noise);
+  Misfit m = begin_misfit(seen, tolerance, starts_fitted ? kNoiseAllowance : 2);
   std::vector<double> square(static_cast<std::size_t>(seen.points()), 0);  // of a coordinate
   double all = 0;
   for (std::int64_t f = 0; f < seen.frames; ++f) {
@@ -86,10 +98,29 @@ Misfit misfit_of(const Observation& seen, const Trajectory& fitted, double toler
   }
   m.over_size /= all;
   m.over_size = std::sqrt(m.over_size);
-  m.grows = seen.frames;
-  while (m.grows > 0 && m.root[m.grows - 1] > m.allowed) --m.grows;
+  find_growth(m);
   m.particle = std::max_element(square.begin(), square.end()) - square.begin();
   find_block(seen, square, m);
+  return m;
+}
+
+Misfit misfit_of_clouds(const Observation& seen, const Trajectory& fitted, double tolerance) {
+  const torch::NoGradGuard no_grad;
+  Misfit m = begin_misfit(seen, tolerance, 2);
+  const double size = observed_size(seen);
+  const CloudComparison comparison(seen, CloudDetail::all);
+  const torch::Tensor x = torch::tensor(fitted.x, torch::kFloat64).view({fitted.frames, -1, 3});
+  const torch::Tensor square = (comparison.residuals(x) / size).square();
+  const auto columns = static_cast<double>(comparison.columns());
+  const torch::Tensor sums = square.sum(1),
+                      of_points = square.view({fitted.frames, -1, 3}).sum(2).amax(1);
+  for (std::int64_t f = 0; f < fitted.frames; ++f) {
+    m.root.push_back(std::sqrt(sums[f].item<double>() / columns));
+    m.largest.push_back(std::sqrt(of_points[f].item<double>()));
+  }
+  m.over_size = std::sqrt(sums.sum().item<double>() /
+                          (comparison.seen_per_frame() * static_cast<double>(fitted.frames)));
+  find_growth(m);
   return m;
 }
 
@@ -101,6 +132,7 @@ std::string misfit_place(const Misfit& m, const Observation& seen) {
       m.grows <= last
           ? fmt::format("from {:.3g} s on it stays above that", m.time[m.grows] - m.time[0])
           : fmt::format("it is largest at {:.3g} s", m.time[peak] - m.time[0]);
+  if (seen.cloud > 0) return when;
   const std::vector<double> starts = starts_of(seen);
   const double* x = starts.data() + 3 * m.particle;
   return fmt::format(

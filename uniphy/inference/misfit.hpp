@@ -38,6 +38,10 @@ struct Misfit {
 /// from have it as well.
 Misfit misfit_of(const Observation& seen, const Trajectory& fitted, double tolerance,
                  bool starts_fitted);
+/// The same of clouds and a roll-out of the particles, by CloudComparison; where on the body is not
+/// told.
+Misfit misfit_of_clouds(const Observation& seen, const Trajectory& fitted, double tolerance);
+
 /// What a right law may miss in a forecast, over what it may in a fit: of the families and of laws
 /// from outside that the numbers hold, forecasts of the benchmark cube are off by two to four times
 /// the fit.

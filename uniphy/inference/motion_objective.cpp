@@ -24,13 +24,14 @@ template <class T>
 class RolloutObjective : public MotionObjective {
  public:
   RolloutObjective(const Observation& observation, const ObservedSteps& steps,
-                   const kernels::GridSettings& grid, const std::string& rollout)
+                   const kernels::GridSettings& grid, const std::string& rollout,
+                   CloudDetail detail)
       : observation_(observation),
         steps_(steps),
         grid_(grid),
         rollout_(rollout == "stepwise" ? &stepwise_rollout : &ops::rollout),
         particles_(observation.particles),
-        points_(observation.points()) {
+        points_(observation.cloud > 0 ? observation.particles : observation.points()) {
     const std::vector<double> mass = observed_mass(observation);
     mass_.assign(mass.begin(), mass.end());
     volume_.assign(observation.volume.begin(), observation.volume.end());
@@ -42,11 +43,12 @@ class RolloutObjective : public MotionObjective {
     x0_ = torch::tensor(start_, torch::kFloat64).to(dtype).view({-1, 3});
     mass_tensor_ = torch::tensor(mass_, dtype);
     volume_tensor_ = torch::tensor(volume_, dtype);
-    seen_ = torch::tensor(observation.x, torch::kFloat64).view({-1, 3 * points_});
-    const Tensor hidden = seen_.isnan();
-    const std::int64_t count = seen_.numel() - hidden.sum().item<std::int64_t>();
-    if (count < seen_.numel()) hidden_ = hidden;
-    per_frame_ = static_cast<double>(count) / static_cast<double>(observation.frames);
+    if (observation.cloud > 0) {
+      clouds_ = std::make_unique<const CloudComparison>(observation, detail);
+      per_frame_ = clouds_->seen_per_frame();
+    } else {
+      see(observation);
+    }
     std::vector<std::int64_t> states;  // among those that the roll-out hands out
     for (const std::ptrdiff_t step : steps.step) states.push_back(step / steps.stride);
     states_ = torch::tensor(states);
@@ -59,7 +61,7 @@ class RolloutObjective : public MotionObjective {
              std::ptrdiff_t frames) const override {
     // First within the frames: sums of rows have one order on any number of threads.
     const Tensor square = residuals(body, start, frames).square();
-    if (!hidden_.defined()) return square.mean(1).mean();
+    if (!hidden_.defined() && clouds_ == nullptr) return square.mean(1).mean();
     return square.sum(1).mean() / per_frame_;
   }
 
@@ -83,7 +85,9 @@ class RolloutObjective : public MotionObjective {
                               .x.slice(1, all - points_, all)
                               .flatten(1)
                               .to(torch::kFloat64);
-    const Tensor r = at_frames(states, frames) - seen_.slice(0, 0, frames);
+    const Tensor x = at_frames(states, frames);
+    if (clouds_ != nullptr) return clouds_->residuals(x.view({frames, particles_, 3}));
+    const Tensor r = x - seen_.slice(0, 0, frames);
     return hidden_.defined() ? r.masked_fill(hidden_.slice(0, 0, frames), 0) : r;
   }
 
@@ -91,6 +95,7 @@ class RolloutObjective : public MotionObjective {
 
   std::vector<double> frame_mse(const kernels::LawDescription& law, const InitialState& from,
                                 std::ptrdiff_t frames) const override {
+    if (clouds_ != nullptr) return cloud_mse(law, from, frames);
     std::vector<double> result(frames, kInfinity);
     try {
       const kernels::Rollout<T> rollout = rollout_of(law);
@@ -140,6 +145,35 @@ class RolloutObjective : public MotionObjective {
   }
 
  private:
+  void see(const Observation& observation) {
+    seen_ = torch::tensor(observation.x, torch::kFloat64).view({-1, 3 * points_});
+    const Tensor hidden = seen_.isnan();
+    const std::int64_t count = seen_.numel() - hidden.sum().item<std::int64_t>();
+    if (count < seen_.numel()) hidden_ = hidden;
+    per_frame_ = static_cast<double>(count) / static_cast<double>(observation.frames);
+  }
+
+  std::vector<double> cloud_mse(const kernels::LawDescription& law, const InitialState& from,
+                                std::ptrdiff_t frames) const {
+    const torch::NoGradGuard no_grad;
+    std::vector<double> all, result(frames, kInfinity);
+    try {
+      visit_frames(rollout_of(law), initial(from), steps_, frames,
+                   [&](std::ptrdiff_t, const std::vector<T>& x) {
+                     all.insert(all.end(), x.begin(), x.end());
+                   });
+    } catch (const Error&) {  // left the grid: the later frames stay infinite
+    }
+    const Tensor x = torch::tensor(all, torch::kFloat64).view({-1, particles_, 3});
+    if (x.size(0) == 0) return result;
+    const Tensor square = clouds_->residuals(x).square().sum(1) / per_frame_;
+    for (std::int64_t f = 0; f < x.size(0); ++f) {
+      const double mse = square[f].item<double>();
+      if (std::isfinite(mse)) result[f] = mse;
+    }
+    return result;
+  }
+
   kernels::Rollout<T> rollout_of(const kernels::LawDescription& law) const {
     std::vector<kernels::BodyRange<T>> bodies{{0, particles_, kernels::make_law<T>(law)}};
     const auto all = static_cast<std::ptrdiff_t>(mass_.size());
@@ -211,11 +245,12 @@ class RolloutObjective : public MotionObjective {
   kernels::GridSettings grid_;
   decltype(&ops::rollout) rollout_;
   std::int64_t particles_, points_;
-  std::vector<T> mass_, volume_;             // of particles and tracers
-  std::vector<double> start_;                // likewise
-  Tensor x0_, mass_tensor_, volume_tensor_;  // the same, in T
-  Tensor seen_;                              // [frames, 3 points], float64
-  Tensor hidden_;                            // likewise; undefined: nothing is
+  std::vector<T> mass_, volume_;                   // of particles and tracers
+  std::vector<double> start_;                      // likewise
+  Tensor x0_, mass_tensor_, volume_tensor_;        // the same, in T
+  std::unique_ptr<const CloudComparison> clouds_;  // of clouds, in place of what follows
+  Tensor seen_;                                    // [frames, 3 points], float64
+  Tensor hidden_;                                  // likewise; undefined: nothing is
   double per_frame_;
   Tensor states_, fraction_;  // [frames], [frames, 1]
   bool between_ = false;
@@ -231,16 +266,14 @@ void keep_thread_count() {
 
 }  // namespace
 
-std::unique_ptr<const MotionObjective> make_motion_objective(const Observation& observation,
-                                                             const ObservedSteps& steps,
-                                                             const kernels::GridSettings& grid,
-                                                             const std::string& dtype,
-                                                             const std::string& rollout) {
+std::unique_ptr<const MotionObjective> make_motion_objective(
+    const Observation& observation, const ObservedSteps& steps, const kernels::GridSettings& grid,
+    const std::string& dtype, const std::string& rollout, CloudDetail detail) {
   keep_thread_count();
   if (dtype == "float64") {
-    return std::make_unique<RolloutObjective<double>>(observation, steps, grid, rollout);
+    return std::make_unique<RolloutObjective<double>>(observation, steps, grid, rollout, detail);
   }
-  return std::make_unique<RolloutObjective<float>>(observation, steps, grid, rollout);
+  return std::make_unique<RolloutObjective<float>>(observation, steps, grid, rollout, detail);
 }
 
 double mean_of_first(const std::vector<double>& frame_mse, std::ptrdiff_t frames) {

@@ -9,6 +9,7 @@
 
 #include "ops/kernels/laws/law.hpp"
 #include "ops/rollout/rollout.hpp"
+#include "uniphy/inference/cloud_comparison.hpp"
 #include "uniphy/inference/observed_motion.hpp"
 
 namespace uniphy {
@@ -16,7 +17,8 @@ namespace uniphy {
 /// How well a law explains an observation: the mean over frames (the first included), points and
 /// coordinates of (x̂ − x)², x̂ from a roll-out of the body that starts at the first observed frame.
 /// Points that are no particles are tracers in it. What is hidden does not count: sums
-/// are divided by the number of coordinates that a frame shows on average. Immutable; calls may run
+/// are divided by the number of coordinates that a frame shows on average. Of clouds it is the mean
+/// of their distance for one coordinate (CloudComparison). Immutable; calls may run
 /// at the same time.
 class MotionObjective {
  public:
@@ -30,7 +32,8 @@ class MotionObjective {
   /// fails.
   virtual torch::Tensor mse(const ops::RolloutBody& body, const InitialFields& start,
                             std::ptrdiff_t frames) const = 0;
-  /// x̂ − x, m, float64 [frames, 3 points], 0 where hidden, by the same roll-out.
+  /// x̂ − x, m, float64 [frames, 3 points], 0 where hidden, by the same roll-out; of clouds
+  /// [frames, CloudComparison::columns()].
   virtual torch::Tensor residuals(const ops::RolloutBody& body, const InitialFields& start,
                                   std::ptrdiff_t frames) const = 0;
   /// Share of each of the first `frames` frames in that mean: their mean is mse(); infinite from
@@ -56,12 +59,14 @@ class MotionObjective {
 };
 
 /// `dtype`, the precision of the roll-outs, is float32 or float64; `rollout` is fused
-/// (ops::rollout) or stepwise (stepwise_rollout). The observation must outlive the objective.
+/// (ops::rollout) or stepwise (stepwise_rollout); `detail` is that of clouds. The observation must
+/// outlive the objective.
 std::unique_ptr<const MotionObjective> make_motion_objective(const Observation& observation,
                                                              const ObservedSteps& steps,
                                                              const kernels::GridSettings& grid,
                                                              const std::string& dtype,
-                                                             const std::string& rollout = "fused");
+                                                             const std::string& rollout = "fused",
+                                                             CloudDetail detail = CloudDetail::all);
 
 /// Mean of the first `frames` numbers.
 double mean_of_first(const std::vector<double>& frame_mse, std::ptrdiff_t frames);

@@ -153,7 +153,8 @@ ObservationCheck check_observation(const Observation& observation, const Observe
   ObservationCheck check;
   check.size = observed_size(observation);
   check.noise = observed_noise(observation);
-  if (observation.start_degree > 0) return check;  // it is not taken for rigid
+  // One is not taken for rigid, the other does not show whether it is.
+  if (observation.start_degree > 0 || observation.cloud > 0) return check;
   check_start(observation, steps, grid, motion, check);
   if (is_complete(observation)) check_energy(observation, grid, motion, check);
   return check;

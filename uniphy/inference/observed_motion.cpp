@@ -12,6 +12,7 @@
 #include "ops/kernels/base/error.hpp"
 #include "ops/kernels/laws/tracer.hpp"
 #include "ops/kernels/rollout/rollout.hpp"
+#include "uniphy/inference/cloud_motion.hpp"
 #include "uniphy/inference/deformed_start.hpp"
 #include "uniphy/inference/misfit.hpp"
 #include "uniphy/inference/observed_frames.hpp"
@@ -126,20 +127,6 @@ Vector3d centre_of(const Observation& observation, const double* x) {
   return sum / total;
 }
 
-/// Whether the body, moving on as a rigid one, reads a node that a wall stops at the frame.
-bool reaches_wall(const Observation& observation, const ObservedSteps& steps,
-                  const kernels::GridSettings& grid, const RigidMotion& motion,
-                  std::ptrdiff_t frame) {
-  const Eigen::Isometry3d pose = flight_pose(steps, grid, motion, frame);
-  const double low = grid.bound + 0.5, high = grid.n - grid.bound - 0.5;  // in cells
-  const std::vector<double> start = observation.start();
-  for (std::int64_t p = 0; p < observation.particles; ++p) {
-    const Vector3d x = grid.n * (pose * Map<const Vector3d>(start.data() + 3 * p));
-    if (!((x.array() >= low).all() && (x.array() < high).all())) return true;
-  }
-  return false;
-}
-
 /// What positions at the frames after the first one say against a flight: those of points that are
 /// seen there and whose start is known.
 bool counts(const Observation& observation, std::size_t k) {
@@ -225,9 +212,23 @@ Eigen::Isometry3d flight_pose(const ObservedSteps& steps, const kernels::GridSet
          Eigen::Translation3d(-motion.centre);
 }
 
+bool reaches_wall(const Observation& observation, const ObservedSteps& steps,
+                  const kernels::GridSettings& grid, const RigidMotion& motion,
+                  std::ptrdiff_t frame) {
+  const Eigen::Isometry3d pose = flight_pose(steps, grid, motion, frame);
+  const double low = grid.bound + 0.5, high = grid.n - grid.bound - 0.5;  // in cells
+  const std::vector<double> start = observation.start();
+  for (std::int64_t p = 0; p < observation.particles; ++p) {
+    const Vector3d x = grid.n * (pose * Map<const Vector3d>(start.data() + 3 * p));
+    if (!((x.array() >= low).all() && (x.array() < high).all())) return true;
+  }
+  return false;
+}
+
 bool is_complete(const Observation& observation) {
-  return !observation.tracked() && std::none_of(observation.x.begin(), observation.x.end(),
-                                                [](double x) { return std::isnan(x); });
+  return !observation.tracked() && observation.cloud == 0 &&
+         std::none_of(observation.x.begin(), observation.x.end(),
+                      [](double x) { return std::isnan(x); });
 }
 
 Vector3d centre_of_mass(const Observation& observation) {
@@ -330,6 +331,7 @@ InitialState observed_motion(const Observation& observation, const ObservedSteps
 MotionEstimate estimate_motion(const Observation& observation, const ObservedSteps& steps,
                                const kernels::GridSettings& grid) {
   if (observation.start_degree > 0) return estimate_deformed_start(observation);
+  if (observation.cloud > 0) return estimate_cloud_motion(observation, steps, grid);
   int frames = 1;
   RigidMotion motion = observed_motion(observation, steps, grid, frames);
   if (observed_noise(observation) > kLittleNoise * observed_size(observation)) {

@@ -59,7 +59,7 @@ RigidMotion observed_motion(const Observation& observation, const ObservedSteps&
 
 /// The same from as many frames as the noise asks for: one where there is next to none, else those
 /// before the body reaches a wall and before it has turned by kFlightAngle. Of a body that is
-/// deformed there, see estimate_deformed_start.
+/// deformed there, see estimate_deformed_start; of clouds, see estimate_cloud_motion.
 InitialState observed_motion(const Observation& observation, const ObservedSteps& steps,
                              const kernels::GridSettings& grid);
 
@@ -80,6 +80,11 @@ inline constexpr double kFlightAngle = 0.2;
 /// Where a rigid body in free flight is at a frame: its pose there over that at the first one.
 Eigen::Isometry3d flight_pose(const ObservedSteps& steps, const kernels::GridSettings& grid,
                               const RigidMotion& motion, std::ptrdiff_t frame);
+
+/// Whether the body, moving on as a rigid one, reads a node that a wall stops at the frame.
+bool reaches_wall(const Observation& observation, const ObservedSteps& steps,
+                  const kernels::GridSettings& grid, const RigidMotion& motion,
+                  std::ptrdiff_t frame);
 
 /// The first frame at which a wall acts; the number of frames where that never happens. Of a
 /// complete observation it is where the centre of mass has left the parabola of free flight by more

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "ops/kernels/base/statistics.hpp"
+#include "uniphy/inference/cloud_comparison.hpp"
 
 namespace uniphy {
 
@@ -35,6 +36,7 @@ double path_noise(const std::vector<double>& time, const double* c, std::int64_t
 }
 
 double observed_noise(const Observation& observation) {
+  if (observation.cloud > 0) return cloud_noise(observation);
   if (!std::isnan(observation.noise)) return observation.noise;
   return path_noise(observation.time, observation.x.data(), observation.points());
 }

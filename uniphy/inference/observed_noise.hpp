@@ -12,7 +12,8 @@ namespace uniphy {
 /// motion has next to none of. 0 with less than four frames. NaN is passed over.
 double path_noise(const std::vector<double>& time, const double* c, std::int64_t points);
 
-/// Of the observed positions, m: what the observation says, else the estimate.
+/// Of the observed positions, m: what the observation says, else the estimate. Of clouds, what a
+/// cloud leaves of the body in its right place (cloud_noise).
 double observed_noise(const Observation& observation);
 
 }  // namespace uniphy

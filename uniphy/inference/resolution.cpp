@@ -50,7 +50,8 @@ void fill_body(Observation& seen, const Solid& solid, double particles_a_cell,
   } catch (const Error& error) {
     throw Error(fmt::format("{}: /body: {}", name, error.what()));
   }
-  if (!seen.tracked()) seen.tracers.assign(seen.x.begin(), seen.x.begin() + 3 * seen.particles);
+  if (!seen.tracked() && seen.cloud == 0)
+    seen.tracers.assign(seen.x.begin(), seen.x.begin() + 3 * seen.particles);
   seen.particles = static_cast<std::int64_t>(x.size());
   seen.volume.assign(x.size(), solid.volume() / static_cast<double>(x.size()));
   seen.body.clear();

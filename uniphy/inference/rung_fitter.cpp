@@ -51,6 +51,7 @@ FitOptions RungFitter::rung_options(bool differences) const {
   FitOptions o = options_;
   if (differences) o.dtype = "float64";
   o.rollout = "fused";
+  o.detail = detail_;
   o.pull = adaptation_.pull;
   o.stages = {FitStage()};
   return o;

@@ -35,6 +35,8 @@ class RungFitter {
   /// The initial velocity of all roll-outs from now on.
   void set_motion(const InitialState& motion) { motion_ = motion; }
   const InitialState& motion() const { return motion_; }
+  /// How clouds are compared from now on.
+  void set_detail(CloudDetail detail) { detail_ = detail; }
   /// Where least squares on the first `frames` of `seen`, the observation or its first part, end,
   /// pulled to `to` by `pull`; where asked for, with the initial velocity, which then is that of
   /// all roll-outs. `task` is unique within the rung; for `least_gain` see uniphy::least_squares.
@@ -87,6 +89,7 @@ class RungFitter {
   double size_;
   MotionEstimate first_motion_;  ///< from the first frames alone
   InitialState motion_;
+  CloudDetail detail_ = CloudDetail::all;
   std::vector<std::unique_ptr<AdaptedVariables>> adapted_;  ///< of each rung; empty: analytic
   std::vector<RungReport> reports_;
 };

@@ -15,6 +15,7 @@ namespace uniphy {
 namespace {
 
 constexpr const char* kFormat = "uniphy-observation";
+constexpr const char *kTrackedPoints = "points", *kNoCorrespondence = "none";
 
 /// `fail(object, message)` throws, naming the file.
 using Fail = std::function<void(const std::string& object, const std::string& message)>;
@@ -26,6 +27,27 @@ void check_inside(const std::vector<double>& x, const char* object, const char* 
     if (hidden && std::isnan(x[k])) continue;
     fail(object, fmt::format("expected positions inside the unit cube, found {} m of {} {}", x[k],
                              row, k / 3));
+  }
+}
+
+/// Whether the body stands beside the points, in /body.
+bool has_body_group(const Observation& o) { return o.tracked() || o.cloud > 0; }
+
+void check_clouds(const Observation& o, const Fail& fail) {
+  if (o.tracked()) fail("/x", "expected tracked points or clouds, found both");
+  if (o.body.empty() && o.vertices.empty()) {
+    fail("/body", "expected the particles or the surface of the body beside clouds, found neither");
+  }
+  std::int64_t frames = 0;
+  for (std::int64_t f = 0; f < o.frames; ++f) {
+    std::int64_t p = 0;
+    while (p < o.cloud && !o.is_seen(f, p)) ++p;
+    if (p < o.cloud) ++frames;
+  }
+  if (frames < 2) {
+    fail("/x", fmt::format("expected at least two frames with a point (attribute correspondence: "
+                           "\"{}\"), found {}",
+                           kNoCorrespondence, frames));
   }
 }
 
@@ -50,7 +72,7 @@ void check_points(const Observation& o, const Fail& fail) {
     const std::size_t point = k / 3 % count, frame = k / 3 / count;
     const auto at = [&] { return fmt::format("of point {} in frame {}", point, frame); };
     if (std::isnan(o.x[k])) {
-      if (frame == 0 && !o.tracked()) {
+      if (frame == 0 && !has_body_group(o)) {
         fail("/x", "expected every particle in the first frame, found NaN " + at());
       }
       for (std::size_t c = k - k % 3; c < k - k % 3 + 3; ++c) {
@@ -63,7 +85,9 @@ void check_points(const Observation& o, const Fail& fail) {
            fmt::format("expected positions inside the unit cube, found {} m {}", o.x[k], at()));
     }
   }
-  if (std::all_of(o.x.begin(), o.x.end(), [](double x) { return std::isnan(x); })) {
+  if (o.cloud > 0) {
+    check_clouds(o, fail);
+  } else if (std::all_of(o.x.begin(), o.x.end(), [](double x) { return std::isnan(x); })) {
     fail("/x", "expected positions, found NaN alone");
   }
   if (!std::isnan(o.noise) && !(o.noise >= 0 && o.noise < 1)) {
@@ -72,6 +96,10 @@ void check_points(const Observation& o, const Fail& fail) {
   if (o.start_degree < 0 || o.start_degree > kMostStartDegree) {
     fail("attribute start_degree of /x",
          fmt::format("expected 0 to {}, found {}", kMostStartDegree, o.start_degree));
+  }
+  if (o.start_degree > 0 && o.cloud > 0) {
+    fail("attribute start_degree of /x",
+         fmt::format("expected 0 of clouds without correspondence, found {}", o.start_degree));
   }
 }
 
@@ -90,7 +118,7 @@ void check_body(const Observation& o, const Fail& fail) {
   if (o.particles < 1) {
     fail(apart ? "/body/x" : "/x", "expected at least one particle, found none");
   }
-  const char* volume_name = o.tracked() ? "/body/volume" : "/volume";
+  const char* volume_name = has_body_group(o) ? "/body/volume" : "/volume";
   double volumes = 0;
   for (const double volume : o.volume) {
     if (!(volume > 0)) fail(volume_name, fmt::format("expected volumes > 0, found {}", volume));
@@ -145,7 +173,7 @@ void check(const Observation& observation, const Fail& fail) {
 void write_body(hdf5::Writer& writer, const Observation& o) {
   const std::int64_t particles = o.particles;
   const hdf5::Info volume{"m^3", "volume of each particle at rest"};
-  if (!o.tracked()) {
+  if (!has_body_group(o)) {
     writer.write("volume", o.volume, {particles}, volume);
     return;
   }
@@ -178,10 +206,27 @@ void read_body(const hdf5::Reader& reader, Observation& o) {
   o.volume = reader.read<double>("body/volume", {o.particles}, hdf5::Values::finite);
 }
 
+/// Whether the rows of a frame are points that are tracked from frame to frame.
+bool read_correspondence(const hdf5::Reader& reader, std::int64_t version) {
+  if (!reader.has_attribute("x", "correspondence")) return true;
+  const std::string found = reader.attribute_text("x", "correspondence");
+  if (found == kTrackedPoints) return true;
+  if (version > 1 && found == kNoCorrespondence) return false;
+  const std::string clouds = version > 1 ? fmt::format(" or \"{}\"", kNoCorrespondence) : "";
+  reader.fail("attribute correspondence of /x",
+              fmt::format("expected \"{}\"{} in version {}, found \"{}\"", kTrackedPoints, clouds,
+                          version, found));
+}
+
 }  // namespace
 
 std::vector<double> Observation::start() const {
   return body.empty() ? std::vector<double>(x.begin(), x.begin() + 3 * particles) : body;
+}
+
+bool Observation::shows_any(std::int64_t frame) const {
+  return std::any_of(positions(frame), positions(frame + 1),
+                     [](double x) { return !std::isnan(x); });
 }
 
 Observation begin_observation(const kernels::GridSettings& grid, double density,
@@ -210,10 +255,11 @@ void write_observation(const std::filesystem::path& file, const Observation& obs
     throw Error(fmt::format("{}: {}: {}", file.string(), object, message));
   });
   writer.attribute("/", "format", kFormat);
-  writer.attribute("/", "version", observation.tracked() ? 2 : 1);
+  writer.attribute("/", "version", has_body_group(observation) ? 2 : 1);
   writer.write("x", observation.x, {observation.frames, observation.points(), 3},
                {"m", "observed positions, NaN where hidden"});
   if (!std::isnan(observation.noise)) writer.attribute("x", "noise", observation.noise);
+  if (observation.cloud > 0) writer.attribute("x", "correspondence", kNoCorrespondence);
   if (observation.start_degree != 0) {
     writer.attribute("x", "start_degree", observation.start_degree);
   }
@@ -239,6 +285,7 @@ Observation read_observation(const std::filesystem::path& file) {
   const hdf5::Shape shape = reader.shape("x");
   observation.frames = shape[0];
   if (reader.has_attribute("x", "noise")) observation.noise = reader.attribute_real("x", "noise");
+  const bool tracked = read_correspondence(reader, version);
   const auto integer = [&](const char* object, const char* name) {
     // The nearest int is out of every range that check() knows, too.
     return static_cast<int>(std::clamp<std::int64_t>(reader.attribute_integer(object, name),
@@ -258,7 +305,11 @@ Observation read_observation(const std::filesystem::path& file) {
                                     shape[0], shape[1]));
     }
     read_body(reader, observation);
-    observation.tracers.assign(observation.x.begin(), observation.x.begin() + 3 * shape[1]);
+    if (tracked) {
+      observation.tracers.assign(observation.x.begin(), observation.x.begin() + 3 * shape[1]);
+    } else {
+      observation.cloud = shape[1];
+    }
   }
   observation.grid = integer("scene", "grid");
   observation.dt = reader.attribute_real("scene", "dt");

@@ -5,6 +5,10 @@
 //   attributes  format = "uniphy-observation", version = 1 or 2
 //   /x      [frames, points, 3]     m   observed positions; NaN where a point is hidden
 //           attribute noise (m), optional: standard deviation of a coordinate
+//           attribute correspondence, optional: "points" (the default: row p is one point in all
+//           frames) or, in version 2, "none" (each frame is a cloud: another number of points in
+//           any order, rows of NaN, anywhere in a frame, up to the largest; a frame may be empty,
+//           the first one too, but for two)
 //           attribute start_degree, optional: 0 to 3 (Observation::start_degree)
 //   /time   [frames]                s   increasing, at any times
 //   /scene  attributes: grid (nodes a side), dt (s), gravity [3] (m/s^2),
@@ -53,6 +57,10 @@ struct Observation {
   /// [points, 3] m, where the points are at the first frame, NaN where that is not known; empty:
   /// point p is particle p.
   std::vector<double> tracers;
+  std::int64_t cloud = 0;  ///< rows of a frame without correspondence; 0: rows are tracked points
+  /// How the body is compared with a cloud: "transport", "chamfer" or "nearest"
+  /// (ops::CloudDistance). A choice of the fit, not in the file.
+  std::string cloud_distance = "transport";
   std::vector<double> vertices;  ///< [vertices, 3] m, the surface of a body without particles
   std::vector<std::int64_t> triangles;  ///< [triangles, 3]
 
@@ -64,12 +72,15 @@ struct Observation {
   double density = 1000;  ///< kg/m^3
 
   bool tracked() const { return !tracers.empty(); }  ///< the points are tracers
+  /// Rows of a frame.
   std::int64_t points() const {
+    if (cloud > 0) return cloud;
     return tracked() ? static_cast<std::int64_t>(tracers.size() / 3) : particles;
   }
   const double* positions(std::int64_t frame) const { return x.data() + frame * points() * 3; }
   /// [particles, 3] m, where a roll-out starts from.
   std::vector<double> start() const;
+  bool shows_any(std::int64_t frame) const;  ///< whether the frame has a point
   bool is_seen(std::int64_t frame, std::int64_t point) const {
     return positions(frame)[3 * point] == positions(frame)[3 * point];
   }
@@ -82,7 +93,8 @@ Observation begin_observation(const kernels::GridSettings& grid, double density,
 /// Adds the positions x [points, 3] at `time`.
 void add_frame(Observation& observation, double time, const std::vector<double>& x);
 
-/// Version 1 where the points are the particles, else version 2.
+/// Version 1 where the points are the particles, else version 2. Throws Error for what
+/// read_observation would refuse.
 void write_observation(const std::filesystem::path& file, const Observation& observation);
 /// Throws Error for anything that is missing, of the wrong shape, not finite, or out of range.
 Observation read_observation(const std::filesystem::path& file);

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -103,6 +104,76 @@ TEST(LaboratoryView, NoiseAndHiddenPointsAreAsManyAsAskedFor) {
   EXPECT_NEAR(std::sqrt(square / count), 0.004, 2e-4);
   view.says_noise = false;
   EXPECT_TRUE(std::isnan(laboratory_view(whole, view).noise));
+}
+
+/// Numbers of the particles of moving_box that stand at the points of a frame; −1: none.
+std::vector<std::int64_t> particles_of(const Observation& cloud, std::int64_t frame,
+                                       const Observation& whole, std::int64_t whole_frame) {
+  std::vector<std::int64_t> found;
+  for (std::int64_t p = 0; p < cloud.points(); ++p) {
+    const double* x = cloud.positions(frame) + 3 * p;
+    std::int64_t q = whole.particles - 1;
+    while (q >= 0 && !std::equal(x, x + 3, whole.positions(whole_frame) + 3 * q)) --q;
+    found.push_back(q);
+  }
+  return found;
+}
+
+TEST(LaboratoryView, ACloudShowsOtherParticlesInEveryFrame) {
+  const Observation whole = moving_box();
+  LaboratoryView view;
+  view.cloud = 40;
+  view.stride = 10;
+  const Observation seen = laboratory_view(whole, view);
+  EXPECT_EQ(seen.cloud, 40);
+  EXPECT_EQ(seen.points(), 40);
+  EXPECT_EQ(seen.frames, 3);
+  EXPECT_FALSE(seen.tracked());
+  EXPECT_EQ(seen.body, whole.start());
+  EXPECT_EQ(seen.volume, whole.volume);
+  const std::vector<std::int64_t> first = particles_of(seen, 0, whole, 0);
+  const std::vector<std::int64_t> last = particles_of(seen, 2, whole, 20);
+  for (std::vector<std::int64_t> drawn : {first, last}) {
+    EXPECT_FALSE(std::is_sorted(drawn.begin(), drawn.end()));
+    std::sort(drawn.begin(), drawn.end());
+    EXPECT_GE(drawn.front(), 0);
+    EXPECT_EQ(std::unique(drawn.begin(), drawn.end()), drawn.end()) << "drawn twice";
+  }
+  EXPECT_NE(first, last);
+  EXPECT_EQ(laboratory_view(whole, view).x, seen.x);
+  view.seed = 2;
+  EXPECT_NE(laboratory_view(whole, view).x, seen.x);
+}
+
+TEST(LaboratoryView, ACloudIsWrittenAndReadBack) {
+  const testing::Scratch scratch;
+  LaboratoryView view;
+  view.cloud = 64;
+  view.noise = 0.01;
+  const Observation seen = laboratory_view(moving_box(), view);
+  EXPECT_NEAR(seen.noise, 0.004, 1e-12);
+  write_observation(scratch.file("o.h5"), seen);
+  const Observation read = read_observation(scratch.file("o.h5"));
+  EXPECT_EQ(read.x, seen.x);
+  EXPECT_EQ(read.cloud, 64);
+  EXPECT_EQ(read.noise, seen.noise);
+  EXPECT_THAT(testing::error_of([&] { laboratory_view(read, {}); }),
+              HasSubstr("attribute correspondence of /x: expected \"points\", found \"none\""));
+}
+
+TEST(LaboratoryView, ACloudThatCannotBeDrawnIsAnError) {
+  const auto message = [](const auto& change) {
+    LaboratoryView view;
+    view.cloud = 10;
+    change(view);
+    return testing::error_of([&] { laboratory_view(moving_box(), view); });
+  };
+  EXPECT_THAT(message([](LaboratoryView& v) { v.cloud = 65; }),
+              HasSubstr("cloud.points: expected at most 64, the points there are, found 65"));
+  EXPECT_THAT(message([](LaboratoryView& v) { v.share = 0.5; }),
+              HasSubstr("expected points.share 1 and points.hidden 0, which are of tracked points, "
+                        "found 0.5 and 0"));
+  EXPECT_THAT(message([](LaboratoryView& v) { v.hidden = 0.1; }), HasSubstr("found 1 and 0.1"));
 }
 
 TEST(LaboratoryView, NothingToSeeIsAnError) {

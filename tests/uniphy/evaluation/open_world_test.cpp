@@ -77,6 +77,19 @@ TEST(OpenWorldCases, ATenthOfThePointsInEveryTenthFrame) {
             0);
 }
 
+TEST(OpenWorldCases, ACloudOfHalfOfTheParticlesInEveryOtherFrame) {
+  const OpenWorldMotion m = open_world_motion(small_cube(), soft(), OpenWorldCase::cloud, 0.005, 1);
+  const std::int64_t frames =
+      (open_world_motion(small_cube(), soft(), OpenWorldCase::closed, 0, 1).motion.seen.frames +
+       1) /
+      2;
+  EXPECT_EQ(m.motion.seen.cloud, 32);
+  EXPECT_EQ(m.motion.seen.frames, frames);
+  EXPECT_FALSE(m.motion.seen.tracked());
+  EXPECT_EQ(m.motion.truth.size(), static_cast<std::size_t>(frames) * 64 * 3);
+  EXPECT_LT(m.floor, 1e-12);
+}
+
 TEST(OpenWorld, MakesTheTableAndGoesOn) {
   const testing::Scratch scratch;
   write_model(scratch.file("model.h5"), testing::readable_model(4));

@@ -10,8 +10,8 @@
 
 #include "tests/support/finite_differences.hpp"
 #include "tests/uniphy/inference/observed_scene.hpp"
+#include "tests/uniphy/inference/quick_fit.hpp"
 #include "uniphy/inference/deformed_start.hpp"
-#include "uniphy/inference/infer_run.hpp"
 
 namespace uniphy {
 namespace {
@@ -188,17 +188,9 @@ Observation pressed_body() {
 
 TEST(DeformedStart, TheLawOfABodyThatBeginsDeformedIsFound) {
   Observation o = pressed_body();
-  const auto variables =
-      make_analytic_variables(kernels::LawId::elastic, {{5e3, 5e5}, {5e3, 5e5}}, 12, 1);
-  FitOptions options;
-  options.stages = {{0.3, 4, 5}, {1, 2, 12}};
-  FitHooks quiet;
-  quiet.progress = false;
-  AdaptationOptions adaptation;
-  adaptation.samples = 0;
-  const Inference rigid = infer(o, "o", *variables, options, quiet, adaptation);
+  const Inference rigid = testing::quick_elastic_fit(o);
   o.start_degree = 2;
-  const Inference found = infer(o, "o", *variables, options, quiet, adaptation);
+  const Inference found = testing::quick_elastic_fit(o);
   EXPECT_LT(found.misfit.over_size, 0.01);
   EXPECT_LT(found.misfit.over_size, 0.1 * rigid.misfit.over_size);
   EXPECT_NEAR(found.fit.law.mu, 2e4, 0.05 * 2e4);

@@ -93,5 +93,19 @@ TEST(MaterialReading, TheStrainSeenIsThatOfAllButAFew) {
   EXPECT_EQ(strain_seen({}), 0);
 }
 
+TEST(MaterialReading, WhatHardlyFlowsWhileItIsSeenIsElastic) {
+  kernels::LawDescription law = law_of(LawId::non_newtonian, 1e5, 1e5);
+  law.tau_y = 5e3;
+  law.eta = 6e5;  // the excess falls by 1/e in η/(2 μ) = 3 s
+  EXPECT_EQ(read_material(law, kStep, 0.3).material, "non_newtonian");
+  EXPECT_EQ(read_material(law, kStep, 0.3, 1.0).material, "non_newtonian");
+  const MaterialReading m = read_material(law, kStep, 0.3, 0.2);
+  EXPECT_EQ(m.material, "elastic");
+  EXPECT_TRUE(std::isnan(m.yield_stress));
+  EXPECT_NEAR(m.mu, 1e5, 1e2);
+  law.eta = 50;
+  EXPECT_EQ(read_material(law, kStep, 0.3, 0.2).material, "non_newtonian");
+}
+
 }  // namespace
 }  // namespace uniphy

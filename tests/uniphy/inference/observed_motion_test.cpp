@@ -89,6 +89,17 @@ TEST(ObservedMotion, ContactIsSeenWhereGravityAloneDoesNotExplainTheMotion) {
             10);
 }
 
+TEST(ObservedMotion, CloudsAreNotComplete) {
+  Observation o;
+  o.frames = 2;
+  o.particles = 1;
+  o.x.assign(6, 0.5);
+  EXPECT_TRUE(is_complete(o));
+  o.cloud = 1;
+  o.body.assign(3, 0.5);
+  EXPECT_FALSE(is_complete(o));
+}
+
 TEST(ObservedSteps, FramesMayBeUneven) {
   Observation o;
   o.dt = 1e-3;

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 
@@ -71,6 +72,93 @@ TEST(Observation, TrackedPointsAndTheirBodyReadBack) {
   EXPECT_FALSE(read.is_seen(1, 1));
   EXPECT_TRUE(read.is_seen(1, 0));
   EXPECT_EQ(read.positions(2)[0], 0.12);
+}
+
+/// Clouds of 2, 0 and 1 points in two rows beside three particles.
+Observation cloud_example() {
+  Observation o = example();
+  o.body = {0.1, 0.1, 0.1, 0.2, 0.1, 0.1, 0.1, 0.3, 0.1};
+  o.particles = 3;
+  o.volume = {1e-6, 2e-6, 3e-6};
+  o.cloud = 2;
+  std::fill(o.x.begin() + 6, o.x.begin() + 15, std::nan(""));
+  return o;
+}
+
+/// A position as itself, NaN as a number that is none.
+std::vector<double> comparable(std::vector<double> x) {
+  for (double& v : x) v = std::isnan(v) ? -1 : v;
+  return x;
+}
+
+TEST(Observation, CloudsReadBack) {
+  const testing::Scratch scratch;
+  const Observation written = cloud_example();
+  write_observation(scratch.file("o.h5"), written);
+  const hdf5::Reader reader(scratch.file("o.h5"));
+  EXPECT_EQ(reader.attribute_integer("/", "version"), 2);
+  EXPECT_EQ(reader.attribute_text("x", "correspondence"), "none");
+  const Observation read = read_observation(scratch.file("o.h5"));
+  EXPECT_EQ(read.cloud, 2);
+  EXPECT_EQ(read.points(), 2);
+  EXPECT_FALSE(read.tracked());
+  EXPECT_EQ(read.particles, 3);
+  EXPECT_EQ(read.start(), written.body);
+  EXPECT_EQ(comparable(read.x), comparable(written.x));
+  EXPECT_FALSE(read.is_seen(1, 0));
+  EXPECT_FALSE(read.is_seen(2, 0));
+  EXPECT_TRUE(read.is_seen(2, 1));
+}
+
+TEST(Observation, CloudsMayStandBesideASurfaceAndBeginLate) {
+  const testing::Scratch scratch;
+  Observation written = cloud_example();
+  written.body.clear();
+  written.volume.clear();
+  written.particles = 0;
+  written.vertices = {0.1, 0.1, 0.1, 0.3, 0.1, 0.1, 0.1, 0.3, 0.1, 0.1, 0.1, 0.3};
+  written.triangles = {0, 2, 1, 0, 1, 3, 1, 2, 3, 0, 3, 2};
+  std::copy_n(example().x.begin() + 6, 6, written.x.begin() + 6);
+  std::fill_n(written.x.begin(), 6, std::nan(""));
+  write_observation(scratch.file("o.h5"), written);
+  const Observation read = read_observation(scratch.file("o.h5"));
+  EXPECT_EQ(read.cloud, 2);
+  EXPECT_EQ(read.vertices, written.vertices);
+  EXPECT_FALSE(read.is_seen(0, 0));
+  EXPECT_TRUE(read.is_seen(1, 0));
+}
+
+TEST(Observation, ImpossibleCloudsAreRefused) {
+  struct Case {
+    const char* message;
+    std::function<void(Observation&)> spoil;
+  };
+  const Case cases[] = {
+      {"o.h5: /x: expected at least two frames with a point (attribute correspondence: \"none\"), "
+       "found 1",
+       [](Observation& o) { std::fill(o.x.begin() + 6, o.x.end(), std::nan("")); }},
+      {"o.h5: /x: expected three coordinates, or NaN in all of them, found both of point 1 in "
+       "frame 0",
+       [](Observation& o) { o.x[4] = std::nan(""); }},
+      {"o.h5: /x: expected positions inside the unit cube, found 2 m of point 1 in frame 2",
+       [](Observation& o) { o.x[16] = 2; }},
+      {"o.h5: /body: expected the particles or the surface of the body beside clouds, found "
+       "neither",
+       [](Observation& o) { o.body.clear(); }},
+      {"o.h5: /x: expected tracked points or clouds, found both",
+       [](Observation& o) { o.tracers.assign(6, 0.1); }},
+      {"o.h5: /body/volume: expected volumes > 0, found 0",
+       [](Observation& o) { o.volume[1] = 0; }},
+  };
+  for (const Case& c : cases) {
+    const testing::Scratch scratch;
+    Observation observation = cloud_example();
+    c.spoil(observation);
+    EXPECT_EQ(testing::without_directory(
+                  testing::error_of([&] { write_observation(scratch.file("o.h5"), observation); }),
+                  scratch.path()),
+              c.message);
+  }
 }
 
 TEST(Observation, HoldsNothingAboutTheMaterial) {
@@ -160,6 +248,16 @@ TEST(Observation, MalformedFilesAreRefused) {
        [](hdf5::Writer& w) { w.attribute("scene", "walls", 3.0); }},
       {"o.h5: attribute density of /scene: expected a finite number, found inf",
        [](hdf5::Writer& w) { w.attribute("scene", "density", INFINITY); }},
+      {"o.h5: attribute correspondence of /x: expected \"points\" in version 1, found \"none\"",
+       [](hdf5::Writer& w) { w.attribute("x", "correspondence", "none"); }},
+      {"o.h5: attribute correspondence of /x: expected \"points\" or \"none\" in version 2, found "
+       "\"some\"",
+       [](hdf5::Writer& w) {
+         w.attribute("/", "version", 2);
+         w.attribute("x", "correspondence", "some");
+       }},
+      {"o.h5: attribute correspondence of /x: expected text, found float64",
+       [](hdf5::Writer& w) { w.attribute("x", "correspondence", 1.0); }},
   };
   for (const Case& c : cases) {
     const testing::Scratch scratch;
