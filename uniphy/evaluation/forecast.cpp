@@ -26,7 +26,7 @@ Observation judged(const JudgedMotion& motion, const Observation& from) {
 }
 
 double second_half(const JudgedMotion& motion, const Observation& from,
-                   const kernels::LawDescription& law, const RigidMotion& initial,
+                   const kernels::LawDescription& law, const InitialState& initial,
                    const std::string& dtype) {
   const Observation all = judged(motion, from);
   const ObservedSteps steps = observed_steps(all, motion.name);
@@ -74,7 +74,7 @@ Forecast forecast_or_failure(const JudgedMotion& motion, const std::string& by,
 }
 
 double forecast_error(const JudgedMotion& motion, const kernels::LawDescription& law,
-                      const RigidMotion& initial, const std::string& dtype) {
+                      const InitialState& initial, const std::string& dtype) {
   return second_half(motion, motion.seen, law, initial, dtype);
 }
 

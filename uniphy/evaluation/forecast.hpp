@@ -42,6 +42,6 @@ Forecast forecast_or_failure(const JudgedMotion& motion, const std::string& by,
 /// with that initial velocity: of a true law, the floor that the discretisation leaves. Infinite
 /// where the roll-out fails.
 double forecast_error(const JudgedMotion& motion, const kernels::LawDescription& law,
-                      const RigidMotion& initial, const std::string& dtype);
+                      const InitialState& initial, const std::string& dtype);
 
 }  // namespace uniphy

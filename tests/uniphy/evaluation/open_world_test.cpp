@@ -66,6 +66,19 @@ TEST(OpenWorldCases, ADeformedStartIsLaterInTheSameMotion) {
   EXPECT_EQ(a.x, std::vector<double>(b.positions(first), b.positions(b.frames)));
 }
 
+TEST(OpenWorldCases, AForecastBeginsWithTheWholeState) {
+  const OpenWorldMotion later =
+      open_world_motion(small_cube(), soft(), OpenWorldCase::deformed, 0.005, 1);
+  InitialState state(RigidMotion{centre_of_mass(later.motion.seen), {0, -1, 0}, {0, 0, 0}});
+  state.degree = 1;
+  state.numbers.assign(static_cast<std::size_t>(initial_numbers(1) - 6), 0.0);
+  const double still = forecast_error(later.motion, soft(), state, "float64");
+  const RigidMotion& rigid = state;
+  EXPECT_NEAR(forecast_error(later.motion, soft(), rigid, "float64"), still, 1e-12 + 1e-6 * still);
+  state.numbers.back() = 0.3;  // of the stretch
+  EXPECT_GT(std::abs(forecast_error(later.motion, soft(), state, "float64") - still), 1e-3);
+}
+
 TEST(OpenWorldCases, ATenthOfThePointsInEveryTenthFrame) {
   const OpenWorldMotion m =
       open_world_motion(small_cube(), soft(), OpenWorldCase::hidden, 0.005, 1);

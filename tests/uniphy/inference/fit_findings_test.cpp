@@ -157,6 +157,43 @@ TEST(FitFindings, DustIsNamedWithTheNumberToAskFor) {
       ::testing::Contains(AllOf(HasSubstr("64 particles"), HasSubstr("expected at least 111"))));
 }
 
+TEST(FitFindings, CloudsThatAreTooSparseAreNamed) {
+  Inference made;
+  made.fit.determined = false;
+  made.check.size = 0.3;
+  made.check.noise = 0.06;
+  Observation o = testing::observe(testing::elastic_body());
+  const auto variables = elastic_variables({1e3, 1e6}, {1e3, 1e6});
+  o.cloud = o.particles;
+  EXPECT_THAT(fit_warnings(made, o, *variables),
+              ::testing::Contains(HasSubstr("20 % of the size away from the body in its place")));
+  made.check.noise = 0.02;
+  EXPECT_THAT(fit_warnings(made, o, *variables),
+              Not(::testing::Contains(HasSubstr("away from the body"))));
+}
+
+TEST(FitFindings, AStartOfAHigherDegreeIsNamedWhereOneIsLeft) {
+  Inference made;
+  made.fit.determined = false;
+  made.explained = false;
+  made.check.size = 0.3;
+  made.misfit.time = {0, 1};
+  made.misfit.root = {0, 0};
+  Observation o = testing::observe(testing::elastic_body());
+  made.seen = o;
+  const auto variables = elastic_variables({1e3, 1e6}, {1e3, 1e6});
+  const auto named = [&](int degree) {
+    o.start_degree = degree;
+    for (const std::string& warning : fit_warnings(made, o, *variables)) {
+      if (warning.find("start_degree 3 may leave less") != std::string::npos) return true;
+    }
+    return false;
+  };
+  EXPECT_FALSE(named(0));
+  EXPECT_TRUE(named(2));
+  EXPECT_FALSE(named(3));
+}
+
 TEST(FitFindings, ALargeMisfitIsNamed) {
   const Observation o = testing::observe(testing::elastic_body(2e4, 3e4));
   const auto variables = elastic_variables({1e4, 4e4}, {1e4, 1e5});
