@@ -314,14 +314,14 @@ ParticlePicture frames_picture(const std::vector<std::pair<std::string, const Tr
 }
 
 Playback fit_playback(const Inference& inference, const std::string& title) {
+  const bool cloud = inference.seen.cloud > 0;
   const Trajectory seen = observed_trajectory(inference.seen);
   Trajectory fitted = inference.fitted;
   fitted.F = inference.deformation;
   const double wall = inference.seen.bound / double(inference.seen.grid);
   return {title,
-          {motion_of("observed", seen), inference.seen.cloud > 0
-                                            ? motion_of("fitted", fitted)
-                                            : motion_of("fitted", fitted, "observed", seen)},
+          {motion_of("observed", inference.seen),
+           cloud ? motion_of("fitted", fitted) : motion_of("fitted", fitted, "observed", seen)},
           {},
           wall,
           1 - wall};

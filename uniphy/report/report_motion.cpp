@@ -114,7 +114,9 @@ Motion motion_of(const std::string& name, const Observation& observation) {
     recorder.add(observation.time[static_cast<std::size_t>(f)], observation.positions(f), nullptr,
                  nullptr);
   }
-  return recorder.finish();
+  Motion motion = recorder.finish();
+  motion.cloud = observation.cloud > 0;
+  return motion;
 }
 
 }  // namespace uniphy

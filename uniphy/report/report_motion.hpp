@@ -21,8 +21,9 @@ struct Motion {
   std::vector<float> plastic_strain;  ///< [frames, particles] 1, or empty
   std::vector<float> error;           ///< [frames, particles] m to `reference`, or empty
   std::string reference;              ///< the name of the motion that the error is to
-  std::int64_t frame_stride = 1;      ///< every so many frames of the run are kept
-  std::int64_t particle_stride = 1;   ///< and every so many of its particles
+  bool cloud = false;  ///< row p of a frame is another point than that of the next: without speed
+  std::int64_t frame_stride = 1;     ///< every so many frames of the run are kept
+  std::int64_t particle_stride = 1;  ///< and every so many of its particles
 
   std::int64_t frames() const { return static_cast<std::int64_t>(time.size()); }
 };
@@ -59,7 +60,7 @@ Motion motion_of(const std::string& name, const Trajectory& trajectory);
 /// particles and frames; without where they differ.
 Motion motion_of(const std::string& name, const Trajectory& trajectory,
                  const std::string& reference_name, const Trajectory& reference);
-/// The observed points.
+/// The observed points, or clouds.
 Motion motion_of(const std::string& name, const Observation& observation);
 
 }  // namespace uniphy

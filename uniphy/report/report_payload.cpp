@@ -111,6 +111,7 @@ Json motion_json(const Motion& motion, const Shown& shown, const CodecLevel& lev
     json["error"] = blobs.add(encode_values(motion, motion.error, shown.error, level));
   }
   json["reference"] = motion.reference;
+  json["cloud"] = motion.cloud;
   return json;
 }
 

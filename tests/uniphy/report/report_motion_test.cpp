@@ -94,6 +94,17 @@ TEST(MotionRecorder, KeepsEverySoManyOfTooManyParticles) {
   EXPECT_EQ(motion.x, (std::vector<float>{0, 1, 2, 9, 10, 11, 18, 19, 20}));
 }
 
+TEST(Motion, OfCloudsIsSaidToBe) {
+  Observation o;
+  o.frames = 2;
+  o.particles = 1;
+  o.time = {0, 1};
+  o.x = {0.1, 0.2, 0.3, 0.4, 0.5, 0.6};
+  EXPECT_FALSE(motion_of("observed", o).cloud);
+  o.cloud = 1;
+  EXPECT_TRUE(motion_of("observed", o).cloud);
+}
+
 TEST(Motion, HasNoErrorToAMotionOfOtherParticles) {
   Trajectory a, b;
   a.frames = b.frames = 1;

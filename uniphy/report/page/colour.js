@@ -18,7 +18,7 @@ const colourKinds = {
       const [before, after] = speedFrames(motion, frame);
       const factor = speedFactor(playback, motion, before, after) / playback.fastest;
       for (let p = 0; p < motion.particles; ++p) {
-        out[p] = factor * speedAt(motion, p, before, after);
+        out[p] = motion.cloud ? -1 : factor * speedAt(motion, p, before, after);
       }
     },
   },

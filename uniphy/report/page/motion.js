@@ -105,6 +105,7 @@ function speedAt(motion, particle, before, after) {
 function fastestOf(playback) {
   const speeds = [];
   for (const motion of playback.motions) {
+    if (motion.cloud) continue;
     const frameStep = Math.max(1, Math.floor(motion.frames / 25));
     const particleStep = Math.max(1, Math.floor(motion.particles / 1000));
     for (let f = 0; f < motion.frames; f += frameStep) {
