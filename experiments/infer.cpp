@@ -57,8 +57,12 @@ void run(const uniphy::ObservationSource& observed, const uniphy::FitVariablesSo
   write_latent(out.file("latent.h5"),
                latent_of(result, observation, *variables, model, out.config_yaml()));
   write_trajectory(out.file("trajectory.h5"), result.fitted);
-  if (!result.fit.history.empty())
+  std::error_code ignored;
+  if (result.fit.history.empty()) {
+    std::filesystem::remove(out.file("loss.png"), ignored);  // none of an earlier run
+  } else {
     out.draw("loss.png", loss_chart(result.fit, *variables, "Inference"));
+  }
   write_misfit(out.file("residual.csv"), result.misfit);
   out.draw("residual.png", misfit_chart(result.misfit));
   const Trajectory seen = observed_trajectory(result.seen);
@@ -67,7 +71,6 @@ void run(const uniphy::ObservationSource& observed, const uniphy::FitVariablesSo
       frames_picture({{"observed", &seen}, {"fitted", &result.fitted}}, 5, observation.cloud > 0));
   show(result, *variables, out.report());
   add_metrics(metrics, result, observation, *variables);
-  std::error_code ignored;
   std::filesystem::remove(hooks.state_file, ignored);  // a finished fit is not resumed
   std::filesystem::remove(adaptation_state_file(hooks.state_file), ignored);
 

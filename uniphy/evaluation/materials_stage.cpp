@@ -53,12 +53,15 @@ MaterialsOptions read_options(Section& config) {
     if (std::find(materials.begin(), materials.end(), m.name()) != materials.end())
       draw.materials.push_back(m);
   }
-  const std::vector<std::string> all(std::begin(kOpenWorldCases), std::end(kOpenWorldCases) - 3);
+  std::vector<std::string> offered;  // a finer truth is of a cube alone
+  for (const char* name : kOpenWorldCases) {
+    if (name != std::string(case_name(OpenWorldCase::finer))) offered.push_back(name);
+  }
   for (const std::string& name :
-       config.choices("cases", std::vector<std::string>{"closed", "noise"}, all,
+       config.choices("cases", std::vector<std::string>{"closed", "noise"}, offered,
                       "how they are observed, as in open_world", at_least(1))) {
-    const auto at = std::find(all.begin(), all.end(), name) - all.begin();
-    o.cases.push_back(static_cast<OpenWorldCase>(at));
+    const auto* const at = std::find(std::begin(kOpenWorldCases), std::end(kOpenWorldCases), name);
+    o.cases.push_back(static_cast<OpenWorldCase>(at - std::begin(kOpenWorldCases)));
   }
   o.noise = config.real("noise", 0.005, between(0, 0.2), "",
                         "standard deviation of a coordinate over the size of the object");
@@ -96,10 +99,12 @@ DrawnMotion draw_motion(const MaterialsOptions& o, std::int64_t trajectory) {
       const ObservedSteps steps = observed_steps(motion.whole, motion.object);
       const kernels::GridSettings grid = observed_grid(motion.whole, motion.object);
       const BodyDescription& body = setup.scene.bodies.front();
-      const RigidMotion start{centre_of_mass(motion.whole), body.velocity, body.angular_velocity};
+      const InitialState start(
+          RigidMotion{centre_of_mass(motion.whole), body.velocity, body.angular_velocity});
       const auto F = make_motion_objective(motion.whole, steps, grid, "float64")
                          ->deformations(setup.law(), start, motion.whole.frames);
-      motion.truth = read_material(setup.law(), grid.dt, strain_seen(F));
+      const double duration = motion.whole.time.back() - motion.whole.time.front();
+      motion.truth = read_material(setup.law(), grid.dt, strain_seen(F), duration);
       motion.truth.cohesion = MaterialReading::kNone;  // of none of the families
       return motion;
     } catch (const Error&) {
@@ -153,8 +158,7 @@ void run(const MaterialsOptions& o, RunDirectory& out, Metrics& metrics) {
       MaterialRow row{case_name(c), motion.object, motion.truth, "", {}};
       std::fprintf(stderr, "%s, %s (%zu of %zu)\n", row.object.c_str(), row.observed.c_str(),
                    rows.size() + 1, fits);
-      const Observation seen =
-          laboratory_view(motion.whole, view_of(c, o.noise, o.draw.seed + 1000 * k));
+      const Observation seen = seen_in(c, motion.whole, o.noise, o.draw.seed + 1000 * k);
       const std::string name = fmt::format("{}.{}", row.object, row.observed);
       row.found = fitted(seen, name, *variables, o, finished.stem(name, seen, *variables));
       row.material = named_material(row.found);

@@ -66,17 +66,11 @@ Observation observe_finer(const OutsideScene& scene, const kernels::LawDescripti
   return seen;
 }
 
-/// The initial velocity of the body.
-RigidMotion initial_motion(const OutsideScene& scene, const Observation& seen) {
-  const BodyDescription& body = scene.scene.bodies.front();
-  return {centre_of_mass(seen), body.velocity, body.angular_velocity};
-}
-
-}  // namespace
-
-LaboratoryView view_of(OpenWorldCase c, double noise, std::uint64_t seed) {
+LaboratoryView view_of(OpenWorldCase c, const Observation& whole, double noise,
+                       std::uint64_t seed) {
   LaboratoryView view;
   view.seed = seed;
+  if (c == OpenWorldCase::deformed) view.first = whole.frames / kDeformedAfter;
   if (c == OpenWorldCase::closed || c == OpenWorldCase::finer || c == OpenWorldCase::deformed)
     return view;
   view.noise = noise;
@@ -86,12 +80,27 @@ LaboratoryView view_of(OpenWorldCase c, double noise, std::uint64_t seed) {
   }
   if (c == OpenWorldCase::cloud) {
     view.stride = 2;
+    view.cloud = std::max<std::int64_t>(1, whole.particles / 2);
     return view;
   }
   view.share = 0.1;
   view.stride = 10;
   if (c == OpenWorldCase::hidden) view.hidden = 1.0 / 3;
   return view;
+}
+
+/// The initial velocity of the body.
+RigidMotion initial_motion(const OutsideScene& scene, const Observation& seen) {
+  const BodyDescription& body = scene.scene.bodies.front();
+  return {centre_of_mass(seen), body.velocity, body.angular_velocity};
+}
+
+}  // namespace
+
+Observation seen_in(OpenWorldCase c, const Observation& whole, double noise, std::uint64_t seed) {
+  Observation seen = laboratory_view(whole, view_of(c, whole, noise, seed));
+  if (c == OpenWorldCase::deformed) seen.start_degree = kDeformedDegree;
+  return seen;
 }
 
 const char* case_name(OpenWorldCase c) { return kOpenWorldCases[static_cast<int>(c)]; }
@@ -102,24 +111,19 @@ OpenWorldMotion open_world_motion(const OutsideScene& scene, const kernels::LawD
   moved.scene.bodies.front().law = law;
   const Observation whole =
       c == OpenWorldCase::finer ? observe_finer(moved, law) : observe(moved, law);
-  LaboratoryView view = view_of(c, noise, seed);
   OpenWorldMotion result;
-  if (c == OpenWorldCase::deformed) view.first = whole.frames / kDeformedAfter;
-  if (c == OpenWorldCase::cloud) view.cloud = std::max<std::int64_t>(1, whole.particles / 2);
-  result.motion.seen = laboratory_view(whole, view);
+  result.motion.seen = seen_in(c, whole, noise, seed);
   result.motion.name =
       fmt::format("{} in {}, {}", kernels::law_name(law.id), scene.name, case_name(c));
-  if (c == OpenWorldCase::deformed) {  // in its own state the true law is exact
-    result.motion.seen.start_degree = kDeformedDegree;
-    return result;
-  }
-  for (std::int64_t f = 0; f < whole.frames; f += view.stride) {
+  if (c == OpenWorldCase::deformed) return result;  // in its own state the true law is exact
+  const std::int64_t stride = view_of(c, whole, noise, seed).stride;
+  for (std::int64_t f = 0; f < whole.frames; f += stride) {
     const double* x = whole.positions(f);
     result.motion.truth.insert(result.motion.truth.end(), x, x + 3 * whole.particles);
   }
   JudgedMotion exact = result.motion;
   exact.seen.body = whole.start();
-  result.floor = forecast_error(exact, law, initial_motion(moved, whole), "float64");
+  result.floor = forecast_error(exact, law, InitialState(initial_motion(moved, whole)), "float64");
   return result;
 }
 

@@ -25,9 +25,9 @@ enum class OpenWorldCase {
 inline constexpr const char* kOpenWorldCases[] = {"closed", "noise", "tracked", "hidden",
                                                   "finer",  "cloud", "deformed"};
 const char* case_name(OpenWorldCase c);
-/// How a laboratory sees a motion in a case; noise: standard deviation of a coordinate over the
-/// size of the body. Of `finer` and `deformed`, the view of the closed world.
-LaboratoryView view_of(OpenWorldCase c, double noise, std::uint64_t seed);
+/// How a laboratory sees a whole motion in a case; noise: standard deviation of a coordinate over
+/// the size of the body. Of `finer` it is the motion itself.
+Observation seen_in(OpenWorldCase c, const Observation& whole, double noise, std::uint64_t seed);
 
 struct OpenWorldMotion {
   JudgedMotion motion;

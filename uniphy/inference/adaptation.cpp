@@ -4,13 +4,12 @@
 #include <torch/torch.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <map>
 
-#include "uniphy/inference/best_end.hpp"
 #include "uniphy/inference/candidate_fit.hpp"
+#include "uniphy/inference/code_fit.hpp"
 #include "uniphy/inference/misfit.hpp"
 #include "uniphy/inference/observed_noise.hpp"
 #include "uniphy/inference/rung_fitter.hpp"
@@ -26,13 +25,6 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// Iterations at each horizon that show which start is worth going on with: of water and jelly,
 /// begun from codes of other materials, the right ones are ahead after three.
 constexpr int kTrialIterations = 4;
-/// Fits of z between which the starts of noisy points are moved to where the last one has them: the
-/// flow that says where is that of the fit before.
-constexpr int kStartRounds = 6;
-/// Iterations of those after the first.
-constexpr int kRoundIterations = 4;
-/// Share of the loss that a round has to take away for another.
-constexpr double kRoundGain = 1e-3;
 /// Iterations, and the share of the epochs, of the last fit to the whole observation: it begins
 /// next to where it ends.
 constexpr int kLastIterations = 4;
@@ -70,9 +62,6 @@ class Ladder {
         hooks_(hooks),
         fitted_frames_(fitted_frames),
         fits_starts_(fits_starts),
-        deformed_(observation.start_degree > 0),
-        clouds_(observation.cloud > 0),
-        from_ends_(fits_starts_ || deformed_ || clouds_),
         fitter_(observation_, name, latent, options, adaptation, hooks),
         noise_(observed_noise(observation) / fitter_.size()),
         enough_(std::hypot(adaptation.enough, (fits_starts ? kNoiseAllowance : 2) * noise_)) {}
@@ -119,80 +108,18 @@ class Ladder {
     report.kept = c.kept;
   }
 
-  /// z as without a ladder, then by least squares.
+  /// z alone, as without a ladder.
   Climber fit_latent() {
-    RungTask& task = fitter_.state().task("latent");
-    const auto begin = std::chrono::steady_clock::now();
-    result_.fit = fit_observation(part_, name_, latent_, schedule(), hooks_);
-    const std::chrono::duration<double> time = std::chrono::steady_clock::now() - begin;
-    if (!task.done) {
-      task.seconds = time.count();
-      task.roll_outs = static_cast<int>(result_.fit.history.size()) + latent_.starts();
-      task.done = true;
-      fitter_.state().checkpoint(true);
-    }
-    fitter_.report(Rung::latent).roll_outs += task.roll_outs;
-    fitter_.report(Rung::latent).seconds += task.seconds;
-    const bool converged = options_.stages.back().optimizer == kLevenbergMarquardt;
-    const int rounds = from_ends_ ? kStartRounds : converged ? 0 : 1;
-    FitEnd end = result_.fit.ends.front();
-    if (from_ends_) {
-      fitter_.set_detail(CloudDetail::rough);
-      const SettledEnd best =
-          best_end(fitter_, part_, result_.fit.ends, fitted_horizons(), least_pull(), fits_starts_);
-      fitter_.set_detail(CloudDetail::all);
-      end = best.end;
-      take_starts(best.seen);
-    }
-    fitter_.set_motion(end.motion);
-    result_.fit.start = end.start;
-    Climber c{latent_.label(end.start), to_tensor(end.u), {}};
-    double loss = kInfinity;
-    Observation before = part_;  // the last one whose starts were moved
-    for (int round = 0; round < rounds; ++round) {
-      const std::string name = round == 0 ? "code" : fmt::format("code, round {}", round + 1);
-      const InitialState motion = fitter_.motion();
-      const LeastSquaresEnd to =
-          fitter_.least_squares(part_, part_.frames, Rung::latent, c.point, c.point, least_pull(),
-                                name, round == 0 ? adaptation_.iterations : kRoundIterations,
-                                from_ends_ ? FitVelocity::yes : FitVelocity::held);
-      if (round > 0 && !(to.loss < loss)) {  // the starts moved too far
-        fitter_.set_motion(motion);
-        take_starts(before);
-        break;
-      }
-      c.point = to.point;
-      const bool settled = !(to.loss < (1 - kRoundGain) * loss);
-      loss = to.loss;
-      if (!from_ends_) break;
-      if (fits_starts_) {
-        before = part_;
-        move_starts(Rung::latent, c.point, part_);
-      }
-      if (settled) break;
-    }
-    explained_ = std::sqrt(loss) <= enough_;
-    if (fits_starts_ && !explained_ && !deformed_) {  // what is left is of the law or the grid
-      c.point =
-          fitter_
-              .least_squares(part_, part_.frames, Rung::latent, c.point, c.point, least_pull(),
-                             "code, velocity held", kRoundIterations, FitVelocity::held)
-              .point;
-      move_starts(Rung::latent, c.point, part_);
-    }
+    CodeEnd end = fit_code(fitter_, {part_, name_, latent_, options_, adaptation_, hooks_,
+                                     fits_starts_, enough_, least_pull()});
+    result_.fit = std::move(end.fit);
+    explained_ = end.explained;
+    part_ = end.seen;
+    observation_.body = part_.body;  // the starts of all that is fitted from now on
+    observation_.tracers = part_.tracers;
+    Climber c{latent_.label(result_.fit.start), end.point, {}};
     conclude(c, Rung::latent);
     return c;
-  }
-
-  FitOptions schedule() const {
-    if (deformed_ || clouds_) return schedule_of_starts(options_);
-    return fits_starts_ ? schedule_to_ends(options_) : options_;
-  }
-
-  /// The starts of its points are those of all that is fitted from now on.
-  void take_starts(const Observation& seen) {
-    observation_.body = part_.body = seen.body;
-    observation_.tracers = part_.tracers = seen.tracers;
   }
 
   void add_posterior(Rung rung, const Tensor& point) {
@@ -203,12 +130,6 @@ class Ladder {
     for (const Tensor& sample : result_.posterior.samples) {
       result_.samples.push_back(variables.law(sample.slice(0, 0, variables.size()).contiguous()));
     }
-  }
-
-  /// Moves the starts of the points to where a law and the frames of `seen` have them.
-  void move_starts(Rung rung, const Tensor& point, const Observation& seen) {
-    observation_ = with_corrected_starts(observation_, fitter_.start_shift(seen, rung, point));
-    part_ = first_frames(observation_, fitted_frames_);
   }
 
   /// All frames were fitted, and there is nothing to choose.
@@ -260,20 +181,10 @@ class Ladder {
     return climbers;
   }
 
-  /// Frames of the horizons of the schedule, growing.
-  std::vector<std::ptrdiff_t> fitted_horizons() const {
-    std::vector<std::ptrdiff_t> frames;
-    for (const FitStage& stage : options_.stages) {
-      frames.push_back(horizon_frames(stage.horizon, result_.fit.contact, part_.frames));
-    }
-    std::sort(frames.begin(), frames.end());
-    frames.erase(std::unique(frames.begin(), frames.end()), frames.end());
-    return frames;
-  }
-
-  /// The same, and all of the observation.
-  std::vector<std::ptrdiff_t> growing_horizons() const {
-    std::vector<std::ptrdiff_t> frames = fitted_horizons();
+  /// The horizons of the schedule, and all of the observation.
+  std::vector<std::ptrdiff_t> all_horizons() const {
+    std::vector<std::ptrdiff_t> frames =
+        growing_horizons(options_, result_.fit.contact, part_.frames);
     if (frames.back() < observation_.frames) frames.push_back(observation_.frames);
     return frames;
   }
@@ -282,7 +193,7 @@ class Ladder {
   Climber fit_numbers(const Climber& code) {
     std::vector<Climber> climbers = first_climbers(code);
     for (Climber& c : climbers) c.start = c.point;
-    const std::vector<std::ptrdiff_t> horizons = growing_horizons();
+    const std::vector<std::ptrdiff_t> horizons = all_horizons();
     double pull = kFirstPull;
     for (std::size_t s = 0; s + 1 < horizons.size(); ++s) {
       if (s > 0) pull *= kPullOfHorizons;
@@ -343,7 +254,8 @@ class Ladder {
       fitter_.set_motion(before);
     }
     if (fits_starts_ && rung != Rung::weights)
-      move_starts(rung, last.point, Observation(observation_));
+      observation_ =
+          with_corrected_starts(observation_, fitter_.start_shift(observation_, rung, last.point));
     result_.seen = observation_;
     const AdaptedVariables& chosen = fitter_.variables(rung);
     const Tensor code = chosen.code(last.point).contiguous();
@@ -372,9 +284,6 @@ class Ladder {
   const FitHooks& hooks_;
   const std::ptrdiff_t fitted_frames_;
   const bool fits_starts_;
-  const bool deformed_;   ///< at the first frame
-  const bool clouds_;     ///< without correspondence
-  const bool from_ends_;  ///< of gradients, least squares race: best_end
   RungFitter fitter_;
   double noise_, enough_;   ///< over size
   bool explained_ = false;  ///< by z alone, what is fitted of the observation

@@ -7,8 +7,11 @@
 #include <limits>
 #include <numeric>
 
+#include "ops/kernels/base/error.hpp"
 #include "ops/loss/cloud_residuals.hpp"
 #include "uniphy/geometry/random.hpp"
+#include "uniphy/inference/cloud_misses.hpp"
+#include "uniphy/inference/observed_motion.hpp"
 
 namespace uniphy {
 namespace {
@@ -49,7 +52,9 @@ Tensor clouds_of(const Observation& o, std::int64_t most, UniformRandom& random)
 
 ops::CloudDistance distance_of(const std::string& name) {
   if (name == "nearest") return ops::CloudDistance::nearest;
-  return name == "chamfer" ? ops::CloudDistance::chamfer : ops::CloudDistance::transport;
+  if (name == "chamfer") return ops::CloudDistance::chamfer;
+  if (name == "transport") return ops::CloudDistance::transport;
+  throw Error("cloud_distance: expected transport, chamfer or nearest, found \"" + name + "\"");
 }
 
 }  // namespace
@@ -82,27 +87,26 @@ Tensor CloudComparison::residuals(const Tensor& x) const {
   return targets_->residuals(of_all.contiguous()) * std::sqrt(double(columns_) / 3);
 }
 
-double cloud_noise(const Observation& o) {
-  if (!o.shows_any(0)) {
-    const double volume = std::accumulate(o.volume.begin(), o.volume.end(), 0.0);
-    return ops::default_blur(volume, o.particles);
-  }
+CloudMisses cloud_misses(const Observation& o, const std::vector<double>& x) {
   const torch::NoGradGuard no_grad;
-  const CloudComparison comparison(some_frames(o, {0}), CloudDetail::all);
-  const Tensor r = comparison.residuals(torch::tensor(o.start(), torch::kFloat64).view({1, -1, 3}));
-  return std::sqrt(r.square().sum().item<double>() / double(comparison.columns()));
+  const CloudComparison comparison(o, CloudDetail::all);
+  const Tensor square =
+      comparison.residuals(torch::tensor(x, torch::kFloat64).view({o.frames, -1, 3})).square();
+  const Tensor sums = square.sum(1), points = square.view({o.frames, -1, 3}).sum(2).amax(1);
+  CloudMisses m;
+  for (std::int64_t f = 0; f < o.frames; ++f) {
+    m.root.push_back(std::sqrt(sums[f].item<double>() / double(comparison.columns())));
+    m.largest.push_back(std::sqrt(points[f].item<double>()));
+  }
+  m.over_all =
+      std::sqrt(sums.sum().item<double>() / (comparison.seen_per_frame() * double(o.frames)));
+  return m;
 }
 
-Observation some_frames(const Observation& observation, const std::vector<std::int64_t>& frames) {
-  Observation part = observation;
-  part.frames = static_cast<std::int64_t>(frames.size());
-  part.time.clear();
-  part.x.clear();
-  for (const std::int64_t f : frames) {
-    part.time.push_back(observation.time[f]);
-    part.x.insert(part.x.end(), observation.positions(f), observation.positions(f + 1));
-  }
-  return part;
+double cloud_noise(const Observation& o) {
+  if (o.shows_any(0)) return cloud_misses(some_frames(o, {0}), o.start()).over_all;
+  const double volume = std::accumulate(o.volume.begin(), o.volume.end(), 0.0);
+  return ops::default_blur(volume, o.particles);
 }
 
 }  // namespace uniphy

@@ -126,7 +126,7 @@ MotionEstimate fitted_flight(const FlightOfCloud& flight, std::size_t frames) {
   A.diagonal().array() += 1e-9 * A.trace() + 1e-300;
   const Eigen::MatrixXd covariance = A.inverse() * sum_of_squares(r) / double(frames);
   MotionEstimate estimate;
-  estimate.motion = flight.motion(at);
+  estimate.motion = InitialState(flight.motion(at));
   for (int k = 0; k < 6; ++k)
     estimate.spread.push_back((k < 3 ? kLinearUnit : kAngularUnit) * std::sqrt(covariance(k, k)));
   return estimate;
@@ -147,7 +147,7 @@ MotionEstimate estimate_cloud_motion(const Observation& o, const ObservedSteps& 
     while (last < end && !reaches_wall(o, steps, grid, motion, last + 1)) ++last;
   }
   MotionEstimate estimate;
-  estimate.motion = motion;
+  estimate.motion = InitialState(motion);
   estimate.spread = {1, 1, 1, 5, 5, 5};  // next to nothing is known
   // A body with symmetries may be turned by too much for the later frames at first.
   for (const std::ptrdiff_t until : {(last + 1) / 2, last}) {

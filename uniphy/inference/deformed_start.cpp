@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "uniphy/inference/initial_fields.hpp"
 #include "uniphy/inference/misfit.hpp"
 #include "uniphy/inference/observed_noise.hpp"
 
@@ -28,31 +29,40 @@ struct VelocityFit {
   double miss = 0;         ///< m, root of the mean square of a coordinate
 };
 
+/// By the normal equations, a frame after the other: points may be many.
 VelocityFit fit_velocity(const Observation& o, const MatrixXd& terms,
                          const std::vector<double>& start, int frames) {
-  std::vector<std::pair<std::int64_t, std::int64_t>> seen;  // frame, point
+  const Eigen::Index n = terms.cols(), unknown = frames > 1 ? 2 * n : n;
+  MatrixXd A = MatrixXd::Zero(unknown, unknown), b = MatrixXd::Zero(unknown, 3);
+  double square = 0, count = 0;
   for (std::int64_t f = 1; f <= frames; ++f) {
+    const double t = o.time[f] - o.time[0];
     for (std::int64_t p = 0; p < o.points(); ++p) {
-      if (o.is_seen(f, p) && !std::isnan(start[3 * p])) seen.emplace_back(f, p);
+      if (!o.is_seen(f, p) || std::isnan(start[3 * p])) continue;
+      Eigen::VectorXd row(unknown);
+      row.head(n) = t * terms.row(p).transpose();
+      if (unknown > n) row.tail(n) = 0.5 * t * t * terms.row(p).transpose();
+      const Eigen::RowVector3d moved =
+          Eigen::Map<const Eigen::RowVector3d>(o.positions(f) + 3 * p) -
+          Eigen::Map<const Eigen::RowVector3d>(&start[3 * p]);
+      A += row * row.transpose();
+      b += row * moved;
+      square += moved.squaredNorm();
+      count += 3;
     }
   }
-  const Eigen::Index n = terms.cols(), rows = static_cast<Eigen::Index>(seen.size());
-  const bool curved = frames > 1;
-  MatrixXd A(rows, curved ? 2 * n : n), moved(rows, 3);
-  for (Eigen::Index i = 0; i < rows; ++i) {
-    const auto [f, p] = seen[static_cast<std::size_t>(i)];
-    const double t = o.time[f] - o.time[0];
-    A.row(i).head(n) = t * terms.row(p);
-    if (curved) A.row(i).tail(n) = 0.5 * t * t * terms.row(p);
-    for (int c = 0; c < 3; ++c) moved(i, c) = o.positions(f)[3 * p + c] - start[3 * p + c];
-  }
-  // Few points do not tell every term: those are left at 0.
-  const Eigen::CompleteOrthogonalDecomposition<MatrixXd> qr(A);
+  // Columns of one length: t is small against 1. Few points do not tell every term: those are 0.
+  const Eigen::VectorXd scale = A.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  Eigen::CompleteOrthogonalDecomposition<MatrixXd> solver;
+  solver.setThreshold(1e-12);
+  solver.compute(scale.asDiagonal() * A * scale.asDiagonal());
+  const MatrixXd inverse = scale.asDiagonal() * solver.pseudoInverse() * scale.asDiagonal();
+  const MatrixXd solution = inverse * b;
   VelocityFit fit;
-  const MatrixXd solution = qr.solve(moved);
   fit.coefficients = solution.topRows(n);
-  fit.miss = rows > 0 ? (A * solution - moved).norm() / std::sqrt(3.0 * double(rows)) : 0;
-  fit.spread = qr.pseudoInverse().topRows(n).rowwise().norm();
+  const double left = square - solution.cwiseProduct(b).sum();
+  fit.miss = count > 0 ? std::sqrt(std::max(left, 0.0) / count) : 0;
+  fit.spread = inverse.diagonal().head(n).cwiseMax(0).cwiseSqrt();
   return fit;
 }
 

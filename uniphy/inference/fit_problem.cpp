@@ -31,10 +31,9 @@ constexpr double kAngularUnit = 0.5;  // rad/s, 1/s
 constexpr double kStretchUnit = 0.05;
 
 Tensor units_of(int degree) {
-  const int rigid = 6, linear_terms = velocity_numbers(std::min(degree, 1));
   Tensor units = torch::full({initial_numbers(degree)}, kStretchUnit, torch::kFloat64);
   units.slice(0, 0, velocity_numbers(degree)) = kLinearUnit;
-  units.slice(0, rigid / 2, linear_terms) = kAngularUnit;
+  units.slice(0, 3, velocity_numbers(std::min(degree, 1))) = kAngularUnit;
   return units;
 }
 

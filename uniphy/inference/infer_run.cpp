@@ -111,7 +111,7 @@ Inference infer(const Observation& observation, const std::string& name,
   result.fitted = unfilled_trajectory(seen);
   const ObservedSteps steps = observed_steps(seen, name);
   const kernels::GridSettings grid = observed_grid(seen, name);
-  result.check = check_observation(seen, steps, grid, observed_motion(seen, steps, grid));
+  result.check = check_observation(seen, steps, grid);
   const auto objective = make_motion_objective(seen, steps, grid, options.dtype);
   objective->simulate(result.fit.law, result.fit.motion,
                       [&](std::ptrdiff_t, const std::vector<double>& x) {
@@ -198,6 +198,7 @@ void add_metrics(Metrics& metrics, const Inference& inference, const Observation
   metrics.set("size", inference.size);
   metrics.set("best_start_mse", inference.best_start);
   metrics.set("roll_outs", static_cast<double>(fit.history.size()));
+  metrics.set("roll_outs.all", static_cast<double>(inference.roll_outs));
   if (const auto count = roll_outs_to_a_hundredth(fit)) {
     metrics.set("roll_outs_to_a_hundredth", static_cast<double>(*count));
   }

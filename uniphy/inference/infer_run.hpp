@@ -62,7 +62,8 @@ ModelFile adapted_model(const Inference& inference, const Observation& observati
 /// the best start's: what optimizers are compared by. Nothing where that was never reached.
 std::optional<std::size_t> roll_outs_to_a_hundredth(const FitResult& fit);
 
-/// fit_mse (m²), fit_root_over_size, size, best_start_mse, roll_outs, roll_outs_to_a_hundredth
+/// fit_mse (m²), fit_root_over_size, size, best_start_mse, roll_outs (those with gradients, of the
+/// schedule), roll_outs.all (Inference::roll_outs), roll_outs_to_a_hundredth
 /// (where it was reached), starts, starts_failed,
 /// contact (1, or 0 where no wall acted before the last frame), contact_s,
 /// start_residual_over_size, start_allowed_over_size, start_frames, noise_over_size,

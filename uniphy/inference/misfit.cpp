@@ -1,12 +1,11 @@
 #include "uniphy/inference/misfit.hpp"
 
 #include <fmt/format.h>
-#include <torch/torch.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "uniphy/inference/cloud_comparison.hpp"
+#include "uniphy/inference/cloud_misses.hpp"
 #include "uniphy/inference/observed_motion.hpp"
 #include "uniphy/inference/observed_noise.hpp"
 #include "uniphy/io/atomic_file.hpp"
@@ -105,21 +104,12 @@ Misfit misfit_of(const Observation& seen, const Trajectory& fitted, double toler
 }
 
 Misfit misfit_of_clouds(const Observation& seen, const Trajectory& fitted, double tolerance) {
-  const torch::NoGradGuard no_grad;
   Misfit m = begin_misfit(seen, tolerance, 2);
   const double size = observed_size(seen);
-  const CloudComparison comparison(seen, CloudDetail::all);
-  const torch::Tensor x = torch::tensor(fitted.x, torch::kFloat64).view({fitted.frames, -1, 3});
-  const torch::Tensor square = (comparison.residuals(x) / size).square();
-  const auto columns = static_cast<double>(comparison.columns());
-  const torch::Tensor sums = square.sum(1),
-                      of_points = square.view({fitted.frames, -1, 3}).sum(2).amax(1);
-  for (std::int64_t f = 0; f < fitted.frames; ++f) {
-    m.root.push_back(std::sqrt(sums[f].item<double>() / columns));
-    m.largest.push_back(std::sqrt(of_points[f].item<double>()));
-  }
-  m.over_size = std::sqrt(sums.sum().item<double>() /
-                          (comparison.seen_per_frame() * static_cast<double>(fitted.frames)));
+  const CloudMisses misses = cloud_misses(seen, fitted.x);
+  for (const double root : misses.root) m.root.push_back(root / size);
+  for (const double largest : misses.largest) m.largest.push_back(largest / size);
+  m.over_size = misses.over_all / size;
   find_growth(m);
   return m;
 }

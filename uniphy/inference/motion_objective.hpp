@@ -10,6 +10,7 @@
 #include "ops/kernels/laws/law.hpp"
 #include "ops/rollout/rollout.hpp"
 #include "uniphy/inference/cloud_comparison.hpp"
+#include "uniphy/inference/initial_fields.hpp"
 #include "uniphy/inference/observed_motion.hpp"
 
 namespace uniphy {

@@ -149,12 +149,13 @@ void check_energy(const Observation& o, const kernels::GridSettings& grid,
 }  // namespace
 
 ObservationCheck check_observation(const Observation& observation, const ObservedSteps& steps,
-                                   const kernels::GridSettings& grid, const RigidMotion& motion) {
+                                   const kernels::GridSettings& grid) {
   ObservationCheck check;
   check.size = observed_size(observation);
   check.noise = observed_noise(observation);
   // One is not taken for rigid, the other does not show whether it is.
   if (observation.start_degree > 0 || observation.cloud > 0) return check;
+  const RigidMotion motion = observed_motion(observation, steps, grid);
   check_start(observation, steps, grid, motion, check);
   if (is_complete(observation)) check_energy(observation, grid, motion, check);
   return check;

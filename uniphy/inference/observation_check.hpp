@@ -35,8 +35,9 @@ struct ObservationCheck {
   }
 };
 
+/// By the motion of the first frames (observed_motion).
 ObservationCheck check_observation(const Observation& observation, const ObservedSteps& steps,
-                                   const kernels::GridSettings& grid, const RigidMotion& motion);
+                                   const kernels::GridSettings& grid);
 
 /// Where start_is_rigid() does not hold, a sentence that says by how much.
 std::optional<std::string> start_warning(const ObservationCheck& check);

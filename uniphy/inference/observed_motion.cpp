@@ -284,6 +284,18 @@ std::vector<double> observed_mass(const Observation& observation) {
   return mass;
 }
 
+Observation some_frames(const Observation& observation, const std::vector<std::int64_t>& frames) {
+  Observation part = observation;
+  part.frames = static_cast<std::int64_t>(frames.size());
+  part.time.clear();
+  part.x.clear();
+  for (const std::int64_t f : frames) {
+    part.time.push_back(observation.time[f]);
+    part.x.insert(part.x.end(), observation.positions(f), observation.positions(f + 1));
+  }
+  return part;
+}
+
 Observation first_frames(const Observation& observation, std::ptrdiff_t frames) {
   Observation part = observation;
   part.frames = frames;
@@ -346,7 +358,8 @@ MotionEstimate estimate_motion(const Observation& observation, const ObservedSte
       if (frames > before) motion = observed_motion(observation, steps, grid, frames);
     }
   }
-  return {motion, spread_of(observation, Flight(observation, steps, grid, frames), frames, motion)};
+  return {InitialState(motion),
+          spread_of(observation, Flight(observation, steps, grid, frames), frames, motion)};
 }
 
 std::ptrdiff_t first_contact(const Observation& observation, const ObservedSteps& steps,

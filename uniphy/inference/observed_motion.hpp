@@ -40,6 +40,8 @@ Eigen::Vector3d centre_of_mass(const Observation& observation);
 /// Of a complete observation at a frame, m.
 Eigen::Vector3d centre_of_mass(const Observation& observation, std::ptrdiff_t frame);
 
+/// The frames with those numbers.
+Observation some_frames(const Observation& observation, const std::vector<std::int64_t>& frames);
 /// The first `frames` of an observation.
 Observation first_frames(const Observation& observation, std::ptrdiff_t frames);
 

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "ops/kernels/base/statistics.hpp"
-#include "uniphy/inference/cloud_comparison.hpp"
+#include "uniphy/inference/cloud_misses.hpp"
 
 namespace uniphy {
 

@@ -20,7 +20,6 @@ using torch::Tensor;
 namespace {
 /// Beyond this a pull holds a number as well as any larger one, and rounding spoils the equations.
 constexpr double kMostPull = 1e3;
-constexpr int kRigid = 6;  ///< numbers of a rigid motion
 /// Over size: what no polynomial start tells of a motion. Numbers that the motion does not show (of
 /// a fluid, all of a stretch but its volume) are kept where they are by it.
 constexpr double kPolynomialError = 1e-4;
@@ -175,7 +174,7 @@ Tensor RungFitter::motion_pull(const FitProblem& problem, const Tensor& point,
     const double allowed = (starts ? kNoiseAllowance : 2) * noise;
     beside = std::max(0.0, misfit - allowed * allowed);
   }
-  if (problem.motion_size() > kRigid)
+  if (problem.motion_size() > initial_numbers(0))
     beside = std::max(beside, kPolynomialError * kPolynomialError);
   const double error = std::sqrt(noise * noise / problem.seen(frames) + beside);
   const Tensor spread = torch::tensor(first_motion_.spread, torch::kFloat64);

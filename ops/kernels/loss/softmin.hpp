@@ -69,6 +69,32 @@ UNIPHY_INLINE double largest_exponent(const WeightedPoints& columns, const doubl
   return lane_maximum(largest);
 }
 
+/// The softmin of every row and, where wanted, the mean of the columns by its plan.
+template <bool means>
+inline void softmin_rows(const WeightedPoints& rows, const WeightedPoints& columns, double s,
+                         const double* h, double* softmin, double* barycentres) {
+  for (std::ptrdiff_t i = 0; i < rows.count; ++i) {
+    const Coordinates row = row_at(rows.x, rows.padded, i, s);
+    const double largest = largest_exponent(columns, h, row);
+    V sum(0.0);
+    Coordinates mean{V(0.0), V(0.0), V(0.0)};
+    for (std::ptrdiff_t j = 0; j < columns.padded; j += kWidth) {
+      const Coordinates y = planes_at(columns.x, columns.padded, j);
+      const V u = exp2_lanes(V(dot(row, y, load(h + j)) - V(largest)));
+      sum = sum + u;
+      if constexpr (means)
+        mean = {lane_fma(u, y.x, mean.x), lane_fma(u, y.y, mean.y), lane_fma(u, y.z, mean.z)};
+    }
+    const double total = quick_lane_sum(sum);
+    softmin[i] = half_square(rows, i) - (largest + std::log2(total)) / s;
+    if constexpr (means) {
+      barycentres[i] = quick_lane_sum(mean.x) / total;
+      barycentres[rows.padded + i] = quick_lane_sum(mean.y) / total;
+      barycentres[2 * rows.padded + i] = quick_lane_sum(mean.z) / total;
+    }
+  }
+}
+
 /// What the columns receive from all rows: sums of u_ij and of u_ij x_i + π_ij q_i.
 struct ColumnSums {
   double* share;     ///< [padded]
@@ -168,16 +194,7 @@ inline void softmin(const WeightedPoints& rows, const WeightedPoints& columns,
   using namespace softmin_detail;
   const double s = kLog2E / epsilon;
   column_exponents(columns, potentials, s, scratch);
-  for (std::ptrdiff_t i = 0; i < rows.count; ++i) {
-    const Coordinates row = row_at(rows.x, rows.padded, i, s);
-    const double largest = largest_exponent(columns, scratch, row);
-    V sum(0.0);
-    for (std::ptrdiff_t j = 0; j < columns.padded; j += kWidth) {
-      const Coordinates y = planes_at(columns.x, columns.padded, j);
-      sum = sum + exp2_lanes(V(dot(row, y, load(scratch + j)) - V(largest)));
-    }
-    softmin[i] = half_square(rows, i) - (largest + std::log2(quick_lane_sum(sum))) / s;
-  }
+  softmin_rows<false>(rows, columns, s, scratch, softmin, nullptr);
 }
 
 inline void softmin_adjoint(const WeightedPoints& rows, const WeightedPoints& columns,
@@ -203,23 +220,7 @@ inline void barycentres(const WeightedPoints& rows, const WeightedPoints& column
   using namespace softmin_detail;
   const double s = kLog2E / epsilon;
   column_exponents(columns, potentials, s, scratch);
-  for (std::ptrdiff_t i = 0; i < rows.count; ++i) {
-    const Coordinates row = row_at(rows.x, rows.padded, i, s);
-    const double largest = largest_exponent(columns, scratch, row);
-    V sum(0.0);
-    Coordinates mean{V(0.0), V(0.0), V(0.0)};
-    for (std::ptrdiff_t j = 0; j < columns.padded; j += kWidth) {
-      const Coordinates y = planes_at(columns.x, columns.padded, j);
-      const V u = exp2_lanes(V(dot(row, y, load(scratch + j)) - V(largest)));
-      sum = sum + u;
-      mean = {lane_fma(u, y.x, mean.x), lane_fma(u, y.y, mean.y), lane_fma(u, y.z, mean.z)};
-    }
-    const double total = quick_lane_sum(sum);
-    softmin[i] = half_square(rows, i) - (largest + std::log2(total)) / s;
-    barycentres[i] = quick_lane_sum(mean.x) / total;
-    barycentres[rows.padded + i] = quick_lane_sum(mean.y) / total;
-    barycentres[2 * rows.padded + i] = quick_lane_sum(mean.z) / total;
-  }
+  softmin_rows<true>(rows, columns, s, scratch, softmin, barycentres);
 }
 
 inline void barycentres_adjoint(const WeightedPoints& rows, const WeightedPoints& columns,

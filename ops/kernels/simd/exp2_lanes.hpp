@@ -13,8 +13,8 @@ inline constexpr double kLeastExponent = -1000;
 
 /// 2^x of double lanes to 2e-14 of it, for x ≤ 1000; below kLeastExponent it stays 2^-1000. NaN
 /// stays NaN. 2^n is an integer in the bits of the exponent; 2^r, r in [−½, ½], the polynomial of
-/// least largest relative error, 1.5e-14 (power_of_two(9) of mlp/activation_polynomials.py). Half
-/// the time of a general exponential, which divides.
+/// least largest relative error, 1.5e-14 (power_of_two(9) of mlp/activation_polynomials.py).
+/// Without the division and the checks of a general exponential.
 template <class V>
 UNIPHY_INLINE V exp2_lanes(const V& exponent) {
   const V x = lane_max(V(kLeastExponent), exponent);

@@ -13,6 +13,7 @@
 #include "tests/uniphy/inference/observed_scene.hpp"
 #include "tests/uniphy/inference/quick_fit.hpp"
 #include "uniphy/data/laboratory_view.hpp"
+#include "uniphy/inference/cloud_misses.hpp"
 #include "uniphy/inference/cloud_motion.hpp"
 #include "uniphy/inference/observed_noise.hpp"
 

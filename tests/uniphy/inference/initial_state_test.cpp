@@ -1,7 +1,5 @@
 // The state of a body at the first frame as polynomials in the place.
 
-#include "uniphy/inference/initial_state.hpp"
-
 #include <gtest/gtest.h>
 #include <torch/torch.h>
 
@@ -12,6 +10,7 @@
 #include "tests/uniphy/inference/observed_scene.hpp"
 #include "tests/uniphy/inference/quick_fit.hpp"
 #include "uniphy/inference/deformed_start.hpp"
+#include "uniphy/inference/initial_fields.hpp"
 
 namespace uniphy {
 namespace {

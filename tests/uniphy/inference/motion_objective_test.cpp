@@ -24,7 +24,7 @@ struct Problem {
   Observation observation;
   ObservedSteps steps;
   kernels::GridSettings grid;
-  RigidMotion motion;
+  InitialState motion;
   std::unique_ptr<const MotionObjective> objective;
 
   explicit Problem(const kernels::LawDescription& law, const std::string& dtype = "float64",
@@ -32,7 +32,7 @@ struct Problem {
       : observation(testing::observe(law)),
         steps(observed_steps(observation, "o")),
         grid(observed_grid(observation, "o")),
-        motion(testing::ObservedScene{}.motion),
+        motion(InitialState(testing::ObservedScene{}.motion)),
         objective(make_motion_objective(observation, steps, grid, dtype, rollout)) {}
 
   Tensor velocities() const {
