@@ -1,6 +1,6 @@
 # Build type, warnings, sanitizers, ccache: everything that concerns all targets alike.
 option(UNIPHY_TESTS "Build the tests" ${PROJECT_IS_TOP_LEVEL})
-option(UNIPHY_PCH "Precompile torch/torch.h once for all targets that use LibTorch" ON)
+option(UNIPHY_PCH "Precompile the headers of LibTorch once for all targets that use it" ON)
 option(UNIPHY_CCACHE "Compile through ccache when it is installed" ON)
 set(UNIPHY_SANITIZE "" CACHE STRING "Comma-separated sanitizers, e.g. address,undefined")
 

@@ -56,9 +56,8 @@ function(uniphy_test)
     PROPERTIES ENVIRONMENT "OMP_WAIT_POLICY=passive" TIMEOUT ${timeout})
 endfunction()
 
-# One precompiled torch/torch.h (20 s per translation unit without it) for every target that
-# includes it; their flags must agree, so all of them compile with OpenMP and, because some make up
-# a shared library, with -fPIC.
+# One precompiled ops/base/torch.hpp for every target that uses LibTorch; their flags must agree, so
+# all of them compile with OpenMP and, because some make up a shared library, with -fPIC.
 function(uniphy_use_torch_pch target)
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_GREATER_EQUAL 13)
     # False alarms on the std::vector<bool> inside torch::autograd::Function::apply.
@@ -69,12 +68,13 @@ function(uniphy_use_torch_pch target)
   endif()
   if(NOT TARGET uniphy_torch_pch)
     file(CONFIGURE OUTPUT "${PROJECT_BINARY_DIR}/pch/uniphy_torch_pch.cpp"
-         CONTENT "// Owner of the precompiled torch/torch.h.\n")
+         CONTENT "// Owner of the precompiled ops/base/torch.hpp.\n")
     add_library(uniphy_torch_pch OBJECT "${PROJECT_BINARY_DIR}/pch/uniphy_torch_pch.cpp")
     target_compile_features(uniphy_torch_pch PUBLIC cxx_std_17)
     target_link_libraries(uniphy_torch_pch PRIVATE uniphy_torch OpenMP::OpenMP_CXX)
     target_compile_options(uniphy_torch_pch PRIVATE -fPIC)
-    target_precompile_headers(uniphy_torch_pch PRIVATE <torch/torch.h>)
+    target_precompile_headers(uniphy_torch_pch PRIVATE
+                              "${PROJECT_SOURCE_DIR}/ops/base/torch.hpp")
   endif()
   target_compile_options(${target} PRIVATE -fPIC)
   target_precompile_headers(${target} REUSE_FROM uniphy_torch_pch)

@@ -1,9 +1,8 @@
 #include "models/latent_codes.hpp"
 
-#include <torch/torch.h>
-
 #include <utility>
 
+#include "ops/base/torch.hpp"
 #include "ops/kernels/base/error.hpp"
 
 namespace uniphy::models {

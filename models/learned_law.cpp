@@ -1,12 +1,11 @@
 #include "models/learned_law.hpp"
 
-#include <torch/torch.h>
-
 #include <cmath>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "ops/base/torch.hpp"
 #include "ops/kernels/base/error.hpp"
 
 namespace uniphy::models {

@@ -1,11 +1,11 @@
 #include "models/script_check.hpp"
 
 #include <ATen/CPUGeneratorImpl.h>
-#include <torch/torch.h>
 
 #include <algorithm>
 #include <memory>
 
+#include "ops/base/torch.hpp"
 #include "ops/learned/learned_law.hpp"
 
 namespace uniphy::models {

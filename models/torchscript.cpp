@@ -1,12 +1,13 @@
 #include "models/torchscript.hpp"
 
-#include <torch/torch.h>
+#include <torch/script.h>
 
 #include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "models/torchscript_names.hpp"
 #include "models/torchscript_source.hpp"
+#include "ops/base/torch.hpp"
 #include "ops/kernels/base/error.hpp"
 
 namespace uniphy::models {

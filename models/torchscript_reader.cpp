@@ -1,4 +1,4 @@
-#include <torch/torch.h>
+#include <torch/script.h>
 
 #include <array>
 #include <fstream>
@@ -7,6 +7,7 @@
 
 #include "models/torchscript.hpp"
 #include "models/torchscript_names.hpp"
+#include "ops/base/torch.hpp"
 #include "ops/kernels/base/error.hpp"
 
 namespace uniphy::models {

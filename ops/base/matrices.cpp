@@ -1,8 +1,7 @@
 #include "ops/base/matrices.hpp"
 
-#include <torch/torch.h>
-
 #include "ops/base/tensor_check.hpp"
+#include "ops/base/torch.hpp"
 
 namespace uniphy::ops {
 

@@ -1,9 +1,8 @@
 #include "ops/base/once_differentiable.hpp"
 
-#include <torch/torch.h>
-
 #include <string>
 
+#include "ops/base/torch.hpp"
 #include "ops/kernels/base/error.hpp"
 
 namespace uniphy::ops {

@@ -1,9 +1,8 @@
 #include "ops/base/tensor_check.hpp"
 
-#include <torch/torch.h>
-
 #include <sstream>
 
+#include "ops/base/torch.hpp"
 #include "ops/kernels/base/error.hpp"
 
 namespace uniphy::ops {

@@ -1,9 +1,8 @@
 #include "ops/laws/kirchhoff_stress.hpp"
 
-#include <torch/torch.h>
-
 #include "ops/base/once_differentiable.hpp"
 #include "ops/base/tensor_check.hpp"
+#include "ops/base/torch.hpp"
 
 namespace uniphy::ops {
 

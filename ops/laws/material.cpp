@@ -1,11 +1,10 @@
 #include "ops/laws/material.hpp"
 
-#include <torch/torch.h>
-
 #include <string>
 #include <utility>
 
 #include "ops/base/tensor_check.hpp"
+#include "ops/base/torch.hpp"
 #include "ops/kernels/base/error.hpp"
 #include "ops/kernels/laws/analytic_law.hpp"
 #include "ops/kernels/laws/law_parameters.hpp"

@@ -1,12 +1,11 @@
 #include "ops/laws/return_mapping.hpp"
 
-#include <torch/torch.h>
-
 #include <cmath>
 #include <string>
 
 #include "ops/base/once_differentiable.hpp"
 #include "ops/base/tensor_check.hpp"
+#include "ops/base/torch.hpp"
 #include "ops/kernels/base/error.hpp"
 
 namespace uniphy::ops {

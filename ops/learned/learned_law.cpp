@@ -1,7 +1,5 @@
 #include "ops/learned/learned_law.hpp"
 
-#include <torch/torch.h>
-
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -9,6 +7,7 @@
 
 #include "ops/base/once_differentiable.hpp"
 #include "ops/base/tensor_check.hpp"
+#include "ops/base/torch.hpp"
 #include "ops/kernels/base/error.hpp"
 #include "ops/kernels/learned/learned_law.hpp"
 #include "ops/kernels/simd/aligned_buffer.hpp"

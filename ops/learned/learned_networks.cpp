@@ -1,7 +1,5 @@
 #include "ops/learned/learned_networks.hpp"
 
-#include <torch/torch.h>
-
 #include <algorithm>
 #include <cstring>
 #include <mutex>
@@ -10,6 +8,7 @@
 #include <vector>
 
 #include "ops/base/tensor_check.hpp"
+#include "ops/base/torch.hpp"
 #include "ops/kernels/base/error.hpp"
 
 namespace uniphy::ops {

@@ -1,11 +1,10 @@
 #include "ops/library/arguments.hpp"
 
-#include <torch/torch.h>
-
 #include <algorithm>
 #include <limits>
 
 #include "ops/base/tensor_check.hpp"
+#include "ops/base/torch.hpp"
 #include "ops/kernels/base/error.hpp"
 
 namespace uniphy::ops {

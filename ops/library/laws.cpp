@@ -1,8 +1,9 @@
-#include <torch/torch.h>
+#include <torch/library.h>
 
 #include <string>
 #include <tuple>
 
+#include "ops/base/torch.hpp"
 #include "ops/laws/kirchhoff_stress.hpp"
 #include "ops/laws/return_mapping.hpp"
 #include "ops/library/arguments.hpp"

@@ -1,11 +1,12 @@
 #include "ops/learned/learned_law.hpp"
 
-#include <torch/torch.h>
+#include <torch/library.h>
 
 #include <string>
 #include <tuple>
 
 #include "ops/base/tensor_check.hpp"
+#include "ops/base/torch.hpp"
 #include "ops/library/arguments.hpp"
 #include "ops/library/library.hpp"
 

@@ -1,8 +1,9 @@
-#include <torch/torch.h>
+#include <torch/library.h>
 
 #include <string>
 #include <tuple>
 
+#include "ops/base/torch.hpp"
 #include "ops/library/arguments.hpp"
 #include "ops/library/library.hpp"
 #include "ops/mpm/g2p.hpp"

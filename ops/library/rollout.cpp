@@ -1,12 +1,13 @@
 #include "ops/rollout/rollout.hpp"
 
-#include <torch/torch.h>
+#include <torch/library.h>
 
 #include <string>
 #include <tuple>
 #include <vector>
 
 #include "ops/base/tensor_check.hpp"
+#include "ops/base/torch.hpp"
 #include "ops/kernels/base/error.hpp"
 #include "ops/library/arguments.hpp"
 #include "ops/library/library.hpp"

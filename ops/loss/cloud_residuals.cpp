@@ -1,7 +1,5 @@
 #include "ops/loss/cloud_residuals.hpp"
 
-#include <torch/torch.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,6 +8,7 @@
 
 #include "ops/base/once_differentiable.hpp"
 #include "ops/base/tensor_check.hpp"
+#include "ops/base/torch.hpp"
 #include "ops/kernels/base/error.hpp"
 #include "ops/kernels/base/for_each.hpp"
 #include "ops/kernels/loss/nearest_points.hpp"

@@ -1,13 +1,12 @@
 #include "ops/loss/law_losses.hpp"
 
-#include <torch/torch.h>
-
 #include <cmath>
 #include <string>
 
 #include "ops/base/once_differentiable.hpp"
 #include "ops/base/planes.hpp"
 #include "ops/base/tensor_check.hpp"
+#include "ops/base/torch.hpp"
 #include "ops/kernels/base/error.hpp"
 #include "ops/kernels/learned/learned_law_weights.hpp"
 

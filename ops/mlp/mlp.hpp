@@ -1,10 +1,9 @@
 #pragma once
 
-#include <torch/torch.h>
-
 #include <cstdint>
 #include <vector>
 
+#include "ops/base/torch.hpp"
 #include "ops/kernels/learned/learned_law_weights.hpp"
 
 namespace uniphy::ops {

@@ -1,9 +1,8 @@
 #include "ops/mpm/g2p.hpp"
 
-#include <torch/torch.h>
-
 #include "ops/base/once_differentiable.hpp"
 #include "ops/base/tensor_check.hpp"
+#include "ops/base/torch.hpp"
 #include "ops/kernels/mpm/transfers.hpp"
 #include "ops/mpm/saved_grid.hpp"
 

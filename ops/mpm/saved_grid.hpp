@@ -1,7 +1,6 @@
 #pragma once
 
-#include <torch/torch.h>
-
+#include "ops/base/torch.hpp"
 #include "ops/kernels/mpm/grid.hpp"
 
 namespace uniphy::ops {

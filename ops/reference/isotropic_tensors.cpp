@@ -1,9 +1,8 @@
 #include "ops/reference/isotropic_tensors.hpp"
 
-#include <torch/torch.h>
-
 #include <limits>
 
+#include "ops/base/torch.hpp"
 #include "ops/kernels/learned/learned_law_weights.hpp"
 #include "ops/kernels/learned/power_law.hpp"
 #include "ops/kernels/spectral/limits.hpp"

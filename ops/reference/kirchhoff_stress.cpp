@@ -1,7 +1,6 @@
 #include "ops/reference/kirchhoff_stress.hpp"
 
-#include <torch/torch.h>
-
+#include "ops/base/torch.hpp"
 #include "ops/kernels/base/error.hpp"
 #include "ops/kernels/spectral/limits.hpp"
 #include "ops/reference/svd3.hpp"

@@ -1,7 +1,6 @@
 #include "ops/reference/law_losses.hpp"
 
-#include <torch/torch.h>
-
+#include "ops/base/torch.hpp"
 #include "ops/kernels/learned/learned_law_weights.hpp"
 #include "ops/reference/isotropic_tensors.hpp"
 #include "ops/reference/learned_law.hpp"

@@ -1,9 +1,8 @@
 #include "ops/reference/learned_law.hpp"
 
-#include <torch/torch.h>
-
 #include <limits>
 
+#include "ops/base/torch.hpp"
 #include "ops/kernels/learned/published_scales.hpp"
 #include "ops/reference/isotropic_tensors.hpp"
 #include "ops/reference/mlp.hpp"

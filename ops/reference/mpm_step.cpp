@@ -1,7 +1,6 @@
 #include "ops/reference/mpm_step.hpp"
 
-#include <torch/torch.h>
-
+#include "ops/base/torch.hpp"
 #include "ops/reference/g2p.hpp"
 #include "ops/reference/grid_update.hpp"
 #include "ops/reference/p2g.hpp"

@@ -1,7 +1,6 @@
 #include "ops/reference/p2g.hpp"
 
-#include <torch/torch.h>
-
+#include "ops/base/torch.hpp"
 #include "ops/reference/stencil.hpp"
 
 namespace uniphy::ops::reference {

@@ -1,12 +1,11 @@
 #include "ops/reference/return_mapping.hpp"
 
-#include <torch/torch.h>
-
 #include <cmath>
 #include <string>
 #include <tuple>
 #include <utility>
 
+#include "ops/base/torch.hpp"
 #include "ops/kernels/base/error.hpp"
 #include "ops/kernels/spectral/limits.hpp"
 #include "ops/reference/svd3.hpp"

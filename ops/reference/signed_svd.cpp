@@ -1,9 +1,9 @@
 #include "ops/reference/signed_svd.hpp"
 
-#include <torch/torch.h>
-
 #include <array>
 #include <limits>
+
+#include "ops/base/torch.hpp"
 
 namespace uniphy::ops::reference {
 

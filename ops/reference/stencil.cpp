@@ -1,8 +1,8 @@
 #include "ops/reference/stencil.hpp"
 
-#include <torch/torch.h>
-
 #include <vector>
+
+#include "ops/base/torch.hpp"
 
 namespace uniphy::ops::reference {
 

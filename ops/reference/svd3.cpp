@@ -1,8 +1,8 @@
 #include "ops/reference/svd3.hpp"
 
-#include <torch/torch.h>
-
 #include <tuple>
+
+#include "ops/base/torch.hpp"
 
 namespace uniphy::ops::reference {
 

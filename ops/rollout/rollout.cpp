@@ -1,11 +1,10 @@
 #include "ops/rollout/rollout.hpp"
 
-#include <torch/torch.h>
-
 #include <string>
 
 #include "ops/base/once_differentiable.hpp"
 #include "ops/base/tensor_check.hpp"
+#include "ops/base/torch.hpp"
 #include "ops/kernels/base/error.hpp"
 #include "ops/kernels/laws/law_parameters.hpp"
 #include "ops/kernels/laws/tracer.hpp"

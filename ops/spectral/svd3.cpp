@@ -1,10 +1,9 @@
 #include "ops/spectral/svd3.hpp"
 
-#include <torch/torch.h>
-
 #include "ops/base/matrices.hpp"
 #include "ops/base/once_differentiable.hpp"
 #include "ops/base/tensor_check.hpp"
+#include "ops/base/torch.hpp"
 #include "ops/kernels/laws/law_table.hpp"
 
 namespace uniphy::ops {

@@ -5,13 +5,13 @@
 #include <ATen/CPUGeneratorImpl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <torch/torch.h>
 
 #include <cmath>
 #include <string>
 
 #include "models/latent_codes.hpp"
 #include "models/script_check.hpp"
+#include "ops/base/torch.hpp"
 #include "ops/kernels/base/error.hpp"
 #include "ops/reference/learned_law.hpp"
 #include "tests/support/error_of.hpp"

@@ -2,7 +2,8 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <torch/torch.h>
+#include <torch/script.h>
+#include <torch/serialize.h>
 
 #include <cstdlib>
 #include <filesystem>
@@ -11,6 +12,7 @@
 #include <limits>
 
 #include "models/torchscript.hpp"
+#include "ops/base/torch.hpp"
 #include "tests/models/script_files.hpp"
 #include "tests/support/error_of.hpp"
 #include "tests/support/random_weights.hpp"

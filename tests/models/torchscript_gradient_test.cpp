@@ -3,7 +3,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <torch/torch.h>
 
 #include <cmath>
 #include <functional>
@@ -11,6 +10,7 @@
 
 #include "models/script_check.hpp"
 #include "models/torchscript.hpp"
+#include "ops/base/torch.hpp"
 #include "ops/learned/learned_law.hpp"
 #include "tests/support/caps.hpp"
 #include "tests/support/random_weights.hpp"

@@ -1,11 +1,10 @@
 #pragma once
 
-#include <torch/torch.h>
-
 #include <algorithm>
 #include <random>
 #include <vector>
 
+#include "ops/base/torch.hpp"
 #include "tests/support/law_cases.hpp"
 
 namespace uniphy::testing {

@@ -1,9 +1,8 @@
 #pragma once
 
-#include <torch/torch.h>
-
 #include <vector>
 
+#include "ops/base/torch.hpp"
 #include "ops/loss/law_losses.hpp"
 #include "tests/support/law_loss_cases.hpp"
 #include "tests/support/tensors.hpp"

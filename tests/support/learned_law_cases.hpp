@@ -1,7 +1,5 @@
 #pragma once
 
-#include <torch/torch.h>
-
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -9,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "ops/base/torch.hpp"
 #include "ops/learned/learned_law.hpp"
 #include "tests/support/law_cases.hpp"
 #include "tests/support/random_weights.hpp"

@@ -1,10 +1,9 @@
 #pragma once
 
-#include <torch/torch.h>
-
 #include <functional>
 #include <vector>
 
+#include "ops/base/torch.hpp"
 #include "ops/mpm/g2p.hpp"
 #include "ops/mpm/grid_update.hpp"
 #include "ops/mpm/p2g.hpp"

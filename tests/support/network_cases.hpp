@@ -1,10 +1,9 @@
 #pragma once
 
-#include <torch/torch.h>
-
 #include <cmath>
 #include <vector>
 
+#include "ops/base/torch.hpp"
 #include "ops/mlp/mlp.hpp"
 #include "tests/support/tensors.hpp"
 

@@ -1,13 +1,12 @@
 #pragma once
 
-#include <torch/torch.h>
-
 #include <algorithm>
 #include <cmath>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "ops/base/torch.hpp"
 #include "ops/kernels/laws/law_parameters.hpp"
 #include "ops/rollout/rollout.hpp"
 #include "tests/support/finite_differences.hpp"

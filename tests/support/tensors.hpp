@@ -1,11 +1,10 @@
 #pragma once
 
-#include <torch/torch.h>
-
 #include <algorithm>
 #include <string>
 #include <vector>
 
+#include "ops/base/torch.hpp"
 #include "tests/support/finite_differences.hpp"
 #include "tests/support/law_cases.hpp"
 

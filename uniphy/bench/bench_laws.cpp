@@ -1,5 +1,5 @@
-#include <torch/torch.h>
 
+#include "ops/base/torch.hpp"
 #include "ops/laws/kirchhoff_stress.hpp"
 #include "ops/laws/return_mapping.hpp"
 #include "ops/reference/kirchhoff_stress.hpp"

@@ -1,7 +1,7 @@
-#include <torch/torch.h>
 
 #include <algorithm>
 
+#include "ops/base/torch.hpp"
 #include "ops/kernels/laws/law.hpp"
 #include "ops/reference/learned_law.hpp"
 #include "uniphy/bench/random_law.hpp"

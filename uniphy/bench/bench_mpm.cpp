@@ -1,9 +1,9 @@
-#include <torch/torch.h>
 
 #include <algorithm>
 #include <cmath>
 #include <random>
 
+#include "ops/base/torch.hpp"
 #include "ops/kernels/rollout/rollout_engine.hpp"
 #include "ops/reference/mpm_step.hpp"
 #include "uniphy/bench/free_law.hpp"

@@ -1,5 +1,5 @@
-#include <torch/torch.h>
 
+#include "ops/base/torch.hpp"
 #include "ops/spectral/svd3.hpp"
 #include "uniphy/bench/subjects.hpp"
 

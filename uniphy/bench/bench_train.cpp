@@ -1,7 +1,8 @@
-#include <torch/torch.h>
+#include <torch/optim.h>
 
 #include <random>
 
+#include "ops/base/torch.hpp"
 #include "ops/reference/law_losses.hpp"
 #include "ops/reference/mlp.hpp"
 #include "uniphy/bench/subjects.hpp"

@@ -1,13 +1,13 @@
 #include "uniphy/inference/adaptation.hpp"
 
 #include <fmt/format.h>
-#include <torch/torch.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
 
+#include "ops/base/torch.hpp"
 #include "uniphy/inference/candidate_fit.hpp"
 #include "uniphy/inference/code_fit.hpp"
 #include "uniphy/inference/misfit.hpp"

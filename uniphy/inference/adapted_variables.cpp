@@ -1,6 +1,6 @@
 #include "uniphy/inference/adapted_variables.hpp"
 
-#include <torch/torch.h>
+#include "ops/base/torch.hpp"
 
 namespace uniphy {
 namespace {

@@ -1,6 +1,6 @@
 #include "uniphy/inference/candidate_fit.hpp"
 
-#include <torch/torch.h>
+#include <torch/serialize.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "ops/base/torch.hpp"
 #include "ops/kernels/base/error.hpp"
 #include "uniphy/inference/descent.hpp"
 #include "uniphy/inference/levenberg_marquardt.hpp"

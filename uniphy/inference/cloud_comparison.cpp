@@ -1,12 +1,11 @@
 #include "uniphy/inference/cloud_comparison.hpp"
 
-#include <torch/torch.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numeric>
 
+#include "ops/base/torch.hpp"
 #include "ops/kernels/base/error.hpp"
 #include "ops/loss/cloud_residuals.hpp"
 #include "uniphy/geometry/random.hpp"

@@ -1,12 +1,11 @@
 #include "uniphy/inference/cloud_motion.hpp"
 
-#include <torch/torch.h>
-
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
+#include "ops/base/torch.hpp"
 #include "uniphy/inference/cloud_comparison.hpp"
 #include "uniphy/inference/difference_jacobian.hpp"
 #include "uniphy/inference/levenberg_marquardt.hpp"

@@ -1,13 +1,13 @@
 #include "uniphy/inference/code_fit.hpp"
 
 #include <fmt/format.h>
-#include <torch/torch.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <limits>
 
+#include "ops/base/torch.hpp"
 #include "uniphy/inference/best_end.hpp"
 
 namespace uniphy {

@@ -1,11 +1,10 @@
 #include "uniphy/inference/deformed_start.hpp"
 
-#include <torch/torch.h>
-
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
+#include "ops/base/torch.hpp"
 #include "uniphy/inference/initial_fields.hpp"
 #include "uniphy/inference/misfit.hpp"
 #include "uniphy/inference/observed_noise.hpp"

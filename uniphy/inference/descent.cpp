@@ -1,11 +1,12 @@
 #include "uniphy/inference/descent.hpp"
 
-#include <torch/torch.h>
+#include <torch/optim.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "ops/base/torch.hpp"
 #include "ops/kernels/base/error.hpp"
 
 namespace uniphy {

@@ -1,7 +1,9 @@
-#include <torch/torch.h>
+#include <torch/optim.h>
+#include <torch/serialize.h>
 
 #include <sstream>
 
+#include "ops/base/torch.hpp"
 #include "ops/kernels/base/error.hpp"
 #include "uniphy/inference/descent.hpp"
 

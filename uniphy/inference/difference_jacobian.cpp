@@ -1,12 +1,11 @@
 #include "uniphy/inference/difference_jacobian.hpp"
 
-#include <torch/torch.h>
-
 #include <cmath>
 #include <limits>
 #include <numeric>
 #include <vector>
 
+#include "ops/base/torch.hpp"
 #include "ops/kernels/base/for_each.hpp"
 
 namespace uniphy {

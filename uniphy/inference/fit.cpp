@@ -1,7 +1,6 @@
 #include "uniphy/inference/fit.hpp"
 
 #include <fmt/format.h>
-#include <torch/torch.h>
 
 #include <algorithm>
 #include <chrono>
@@ -12,6 +11,7 @@
 #include <optional>
 #include <set>
 
+#include "ops/base/torch.hpp"
 #include "ops/kernels/base/error.hpp"
 #include "ops/kernels/base/for_each.hpp"
 #include "uniphy/inference/candidate_fit.hpp"

@@ -1,7 +1,5 @@
 #include "uniphy/inference/fit_posterior.hpp"
 
-#include <torch/torch.h>
-
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
@@ -10,6 +8,7 @@
 #include <limits>
 #include <numeric>
 
+#include "ops/base/torch.hpp"
 #include "ops/kernels/base/for_each.hpp"
 #include "uniphy/geometry/random.hpp"
 

@@ -1,12 +1,12 @@
 #include "uniphy/inference/fit_problem.hpp"
 
 #include <fmt/format.h>
-#include <torch/torch.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "ops/base/torch.hpp"
 #include "ops/kernels/base/error.hpp"
 #include "uniphy/inference/observed_noise.hpp"
 #include "uniphy/inference/start_correction.hpp"

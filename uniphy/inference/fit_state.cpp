@@ -1,8 +1,8 @@
 #include <fmt/format.h>
-#include <torch/torch.h>
 
 #include <algorithm>
 
+#include "ops/base/torch.hpp"
 #include "ops/kernels/base/error.hpp"
 #include "uniphy/inference/fit.hpp"
 #include "uniphy/inference/optimizer_bytes.hpp"

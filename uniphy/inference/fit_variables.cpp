@@ -1,7 +1,5 @@
 #include "uniphy/inference/fit_variables.hpp"
 
-#include <torch/torch.h>
-
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -10,6 +8,7 @@
 #include <utility>
 
 #include "models/learned_law.hpp"
+#include "ops/base/torch.hpp"
 #include "ops/kernels/base/error.hpp"
 #include "ops/kernels/laws/law_parameters.hpp"
 #include "uniphy/data/material_ranges.hpp"

@@ -1,9 +1,9 @@
 #include "uniphy/inference/initial_fields.hpp"
 
-#include <torch/torch.h>
-
 #include <algorithm>
 #include <array>
+
+#include "ops/base/torch.hpp"
 
 namespace uniphy {
 namespace {

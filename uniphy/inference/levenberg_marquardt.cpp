@@ -1,6 +1,7 @@
 #include "uniphy/inference/levenberg_marquardt.hpp"
 
-#include <torch/torch.h>
+#include <torch/optim.h>
+#include <torch/serialize.h>
 
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -12,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "ops/base/torch.hpp"
 #include "ops/kernels/base/error.hpp"
 #include "ops/kernels/base/for_each.hpp"
 

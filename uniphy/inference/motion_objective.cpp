@@ -1,13 +1,13 @@
 #include "uniphy/inference/motion_objective.hpp"
 
 #include <omp.h>
-#include <torch/torch.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <memory>
 
+#include "ops/base/torch.hpp"
 #include "ops/kernels/base/error.hpp"
 #include "ops/kernels/laws/tracer.hpp"
 #include "uniphy/inference/observed_frames.hpp"

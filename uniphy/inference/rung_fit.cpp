@@ -1,11 +1,11 @@
 #include "uniphy/inference/rung_fit.hpp"
 
-#include <torch/torch.h>
-
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <optional>
+
+#include "ops/base/torch.hpp"
 
 namespace uniphy {
 namespace {

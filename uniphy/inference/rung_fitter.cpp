@@ -1,13 +1,13 @@
 #include "uniphy/inference/rung_fitter.hpp"
 
 #include <fmt/format.h>
-#include <torch/torch.h>
 
 #include <chrono>
 #include <cmath>
 #include <limits>
 #include <optional>
 
+#include "ops/base/torch.hpp"
 #include "ops/kernels/base/error.hpp"
 #include "uniphy/inference/misfit.hpp"
 #include "uniphy/inference/observed_motion.hpp"

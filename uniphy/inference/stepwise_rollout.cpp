@@ -3,10 +3,9 @@
 
 #include "uniphy/inference/stepwise_rollout.hpp"
 
-#include <torch/torch.h>
-
 #include <string>
 
+#include "ops/base/torch.hpp"
 #include "ops/kernels/base/error.hpp"
 #include "ops/laws/kirchhoff_stress.hpp"
 #include "ops/laws/return_mapping.hpp"

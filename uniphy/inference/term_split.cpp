@@ -1,9 +1,9 @@
 #include "uniphy/inference/term_split.hpp"
 
-#include <torch/torch.h>
-
 #include <algorithm>
 #include <cmath>
+
+#include "ops/base/torch.hpp"
 
 namespace uniphy {
 namespace {

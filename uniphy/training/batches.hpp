@@ -1,10 +1,11 @@
 #pragma once
 
 #include <ATen/CPUGeneratorImpl.h>
-#include <torch/torch.h>
 
 #include <cstdint>
 #include <vector>
+
+#include "ops/base/torch.hpp"
 
 namespace uniphy {
 

@@ -1,7 +1,8 @@
 #pragma once
 
-#include <torch/torch.h>
+#include <torch/optim.h>
 
+#include "ops/base/torch.hpp"
 #include "uniphy/training/batches.hpp"
 #include "uniphy/training/objective.hpp"
 #include "uniphy/training/trainer.hpp"

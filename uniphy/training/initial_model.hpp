@@ -1,8 +1,7 @@
 #pragma once
 
-#include <torch/torch.h>
-
 #include "models/trained_model.hpp"
+#include "ops/base/torch.hpp"
 #include "uniphy/io/dataset.hpp"
 #include "uniphy/training/law_columns.hpp"
 

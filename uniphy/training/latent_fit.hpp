@@ -1,10 +1,9 @@
 #pragma once
 
-#include <torch/torch.h>
-
 #include <cstdint>
 
 #include "models/trained_model.hpp"
+#include "ops/base/torch.hpp"
 #include "uniphy/training/law_columns.hpp"
 #include "uniphy/training/loss_options.hpp"
 

@@ -1,10 +1,9 @@
 #include "uniphy/training/law_columns.hpp"
 
-#include <torch/torch.h>
-
 #include <algorithm>
 #include <cmath>
 
+#include "ops/base/torch.hpp"
 #include "ops/kernels/learned/learned_law_weights.hpp"
 #include "ops/kernels/spectral/spectral.hpp"
 

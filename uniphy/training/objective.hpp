@@ -1,8 +1,7 @@
 #pragma once
 
-#include <torch/torch.h>
-
 #include "models/learned_law.hpp"
+#include "ops/base/torch.hpp"
 #include "ops/loss/law_losses.hpp"
 #include "uniphy/training/law_columns.hpp"
 #include "uniphy/training/loss_options.hpp"

@@ -1,7 +1,6 @@
 #include "uniphy/training/trained_model_file.hpp"
 
-#include <torch/torch.h>
-
+#include "ops/base/torch.hpp"
 #include "ops/kernels/base/error.hpp"
 
 namespace uniphy {

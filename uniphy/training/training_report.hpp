@@ -1,9 +1,8 @@
 #pragma once
 
-#include <torch/torch.h>
-
 #include <vector>
 
+#include "ops/base/torch.hpp"
 #include "uniphy/report/experiment.hpp"
 #include "uniphy/training/trainer.hpp"
 

@@ -3,10 +3,10 @@
 #include "ops/reference/isotropic_tensors.hpp"
 
 #include <gtest/gtest.h>
-#include <torch/torch.h>
 
 #include <cmath>
 
+#include "ops/base/torch.hpp"
 #include "ops/reference/signed_svd.hpp"
 #include "tests/support/deformation_tensors.hpp"
 

@@ -1,11 +1,11 @@
 #pragma once
 
 #include <gtest/gtest.h>
-#include <torch/torch.h>
 
 #include <string>
 #include <tuple>
 
+#include "ops/base/torch.hpp"
 #include "ops/learned/learned_law.hpp"
 #include "tests/support/deformation_tensors.hpp"
 #include "tests/support/random_weights.hpp"

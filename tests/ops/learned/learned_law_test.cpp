@@ -4,8 +4,8 @@
 
 #include <gtest/gtest.h>
 #include <omp.h>
-#include <torch/torch.h>
 
+#include "ops/base/torch.hpp"
 #include "tests/ops/learned/learned_law_op.hpp"
 #include "tests/support/error_of.hpp"
 #include "tests/support/law_cases.hpp"

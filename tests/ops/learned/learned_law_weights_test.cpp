@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 #include <omp.h>
-#include <torch/torch.h>
 
+#include "ops/base/torch.hpp"
 #include "tests/ops/learned/learned_law_op.hpp"
 
 namespace uniphy::ops {

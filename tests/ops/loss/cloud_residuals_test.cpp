@@ -4,7 +4,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <torch/torch.h>
 
 #include <algorithm>
 #include <array>
@@ -12,6 +11,7 @@
 #include <limits>
 #include <numeric>
 
+#include "ops/base/torch.hpp"
 #include "tests/support/error_of.hpp"
 #include "tests/support/on_threads.hpp"
 #include "tests/support/tensors.hpp"

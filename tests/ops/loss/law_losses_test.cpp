@@ -4,8 +4,8 @@
 
 #include <ATen/Parallel.h>
 #include <gtest/gtest.h>
-#include <torch/torch.h>
 
+#include "ops/base/torch.hpp"
 #include "ops/reference/law_losses.hpp"
 #include "tests/support/error_of.hpp"
 #include "tests/support/law_loss_tensors.hpp"

@@ -4,8 +4,8 @@
 
 #include <ATen/Parallel.h>
 #include <gtest/gtest.h>
-#include <torch/torch.h>
 
+#include "ops/base/torch.hpp"
 #include "ops/kernels/base/error.hpp"
 #include "ops/reference/mlp.hpp"
 #include "tests/support/network_cases.hpp"

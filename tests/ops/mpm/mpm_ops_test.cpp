@@ -1,9 +1,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <torch/torch.h>
 
 #include <vector>
 
+#include "ops/base/torch.hpp"
 #include "tests/support/error_of.hpp"
 #include "tests/support/mpm_op_cases.hpp"
 #include "tests/support/tensors.hpp"

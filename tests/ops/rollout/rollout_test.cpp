@@ -3,12 +3,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <omp.h>
-#include <torch/torch.h>
 
 #include <functional>
 #include <string>
 #include <vector>
 
+#include "ops/base/torch.hpp"
 #include "ops/kernels/base/error.hpp"
 #include "ops/reference/mpm_step.hpp"
 #include "tests/support/rollout_cases.hpp"

@@ -4,10 +4,10 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <torch/torch.h>
 
 #include <cmath>
 
+#include "ops/base/torch.hpp"
 #include "tests/support/on_threads.hpp"
 #include "tests/uniphy/inference/observed_scene.hpp"
 #include "tests/uniphy/support/scratch.hpp"

@@ -3,11 +3,11 @@
 #include "uniphy/inference/adapted_variables.hpp"
 
 #include <gtest/gtest.h>
-#include <torch/torch.h>
 
 #include <array>
 #include <cmath>
 
+#include "ops/base/torch.hpp"
 #include "tests/uniphy/inference/observed_scene.hpp"
 #include "uniphy/inference/term_split.hpp"
 

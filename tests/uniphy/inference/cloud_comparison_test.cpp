@@ -4,12 +4,12 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <torch/torch.h>
 
 #include <algorithm>
 #include <cmath>
 #include <random>
 
+#include "ops/base/torch.hpp"
 #include "tests/uniphy/inference/observed_scene.hpp"
 #include "tests/uniphy/inference/quick_fit.hpp"
 #include "uniphy/data/laboratory_view.hpp"

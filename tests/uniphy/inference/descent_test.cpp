@@ -2,12 +2,12 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <torch/torch.h>
 
 #include <cmath>
 #include <functional>
 #include <limits>
 
+#include "ops/base/torch.hpp"
 #include "tests/uniphy/support/scratch.hpp"
 
 namespace uniphy {

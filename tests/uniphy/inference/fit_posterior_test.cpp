@@ -3,11 +3,11 @@
 #include "uniphy/inference/fit_posterior.hpp"
 
 #include <gtest/gtest.h>
-#include <torch/torch.h>
 
 #include <cmath>
 #include <random>
 
+#include "ops/base/torch.hpp"
 #include "tests/support/on_threads.hpp"
 
 namespace uniphy {

@@ -3,10 +3,10 @@
 #include "uniphy/inference/fit_problem.hpp"
 
 #include <gtest/gtest.h>
-#include <torch/torch.h>
 
 #include <cmath>
 
+#include "ops/base/torch.hpp"
 #include "tests/support/finite_differences.hpp"
 #include "tests/uniphy/inference/observed_scene.hpp"
 

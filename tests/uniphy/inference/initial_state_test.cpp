@@ -1,11 +1,11 @@
 // The state of a body at the first frame as polynomials in the place.
 
 #include <gtest/gtest.h>
-#include <torch/torch.h>
 
 #include <cmath>
 #include <random>
 
+#include "ops/base/torch.hpp"
 #include "tests/support/finite_differences.hpp"
 #include "tests/uniphy/inference/observed_scene.hpp"
 #include "tests/uniphy/inference/quick_fit.hpp"

@@ -2,11 +2,12 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <torch/torch.h>
+#include <torch/optim.h>
 
 #include <atomic>
 #include <cmath>
 
+#include "ops/base/torch.hpp"
 #include "tests/support/error_of.hpp"
 #include "tests/support/on_threads.hpp"
 

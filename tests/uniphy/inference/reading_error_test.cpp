@@ -1,9 +1,10 @@
 #include "uniphy/inference/reading_error.hpp"
 
 #include <gtest/gtest.h>
-#include <torch/torch.h>
 
 #include <cmath>
+
+#include "ops/base/torch.hpp"
 
 namespace uniphy {
 namespace {

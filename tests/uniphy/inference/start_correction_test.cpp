@@ -2,10 +2,10 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <torch/torch.h>
 
 #include <cmath>
 
+#include "ops/base/torch.hpp"
 #include "tests/uniphy/inference/observed_scene.hpp"
 #include "tests/uniphy/support/scratch.hpp"
 #include "uniphy/data/laboratory_view.hpp"

@@ -2,8 +2,8 @@
 
 #include <ATen/CPUGeneratorImpl.h>
 #include <gtest/gtest.h>
-#include <torch/torch.h>
 
+#include "ops/base/torch.hpp"
 #include "tests/support/error_of.hpp"
 
 namespace uniphy {
