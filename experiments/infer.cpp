@@ -1,31 +1,46 @@
+#include <cmath>
 #include <cstdio>
 
 #include "ops/kernels/base/error.hpp"
 #include "uniphy/inference/adaptation_options.hpp"
 #include "uniphy/inference/adaptation_state.hpp"
 #include "uniphy/inference/fit_findings.hpp"
-#include "uniphy/inference/infer_run.hpp"
+#include "uniphy/inference/several_bodies.hpp"
 #include "uniphy/report/experiment.hpp"
 
 namespace {
 
+using namespace uniphy;
+
+/// A body of the observation with what was found of it. Of several, `folder` is that of its files.
+struct Found {
+  std::string name, folder;
+  const Observation& observation;
+  const Inference& result;
+
+  std::string file(const char* product) const { return folder + product; }
+  std::string title(const char* of) const { return name.empty() ? of : name + ": " + of; }
+  std::string metric(const std::string& of) const { return name.empty() ? of : name + "." + of; }
+};
+
 /// What is printed of the result, and the motions, in the report.
-void show(const uniphy::Inference& result, const uniphy::FitVariables& variables,
-          uniphy::Report* report) {
+void show(const Found& found, const FitVariables& variables, Report* report) {
   if (report == nullptr) return;
-  report->set_table("Result", fit_summary(result.fit, variables) +
-                                  (result.fit.determined ? belief_text(result.material) : ""));
+  const Inference& result = found.result;
+  report->set_table(found.title("Result"),
+                    fit_summary(result.fit, variables) +
+                        (result.fit.determined ? belief_text(result.material) : ""));
   const std::string rungs = rung_table(result.rung, result.rungs);
-  if (!rungs.empty()) report->set_table("Adaptation", rungs);
-  report->playbacks.push_back(fit_playback(result, "Fit"));
+  if (!rungs.empty()) report->set_table(found.title("Adaptation"), rungs);
+  report->playbacks.push_back(fit_playback(result, found.title("Fit")));
 }
 
 /// The adapted law where there is one; none of an earlier run where there is not.
-std::string write_adapted(const uniphy::Inference& result, const uniphy::Observation& observation,
-                          const std::filesystem::path& model, uniphy::RunDirectory& out) {
-  const std::filesystem::path file = out.file("model.h5");
-  if (result.rung != uniphy::Rung::latent) {
-    write_model(file, adapted_model(result, observation, out.config_yaml()));
+std::string write_adapted(const Found& found, const std::filesystem::path& model,
+                          RunDirectory& out) {
+  const std::filesystem::path file = out.file(found.file("model.h5"));
+  if (found.result.rung != Rung::latent) {
+    write_model(file, adapted_model(found.result, found.observation, out.config_yaml()));
     return file.string();
   }
   std::error_code ignored;
@@ -33,60 +48,91 @@ std::string write_adapted(const uniphy::Inference& result, const uniphy::Observa
   return model.string();
 }
 
-void run(const uniphy::ObservationSource& observed, const uniphy::FitVariablesSource& source,
-         const uniphy::FitOptions& options, const uniphy::AdaptationOptions& adaptation,
-         uniphy::RunDirectory& out, uniphy::Metrics& metrics) {
-  using namespace uniphy;
-  std::error_code none;
-  if (std::filesystem::equivalent(source.model, out.file("model.h5"), none)) {
+void write_found(const Found& found, const FitVariables& variables,
+                 const std::filesystem::path& trained, RunDirectory& out, Metrics& metrics) {
+  const Inference& result = found.result;
+  if (!found.folder.empty()) std::filesystem::create_directories(out.file(found.folder));
+  const std::string model = write_adapted(found, trained, out);
+  write_latent(out.file(found.file("latent.h5")),
+               latent_of(result, found.observation, variables, model, out.config_yaml()));
+  write_trajectory(out.file(found.file("trajectory.h5")), result.fitted);
+  std::error_code ignored;
+  if (result.fit.history.empty()) {
+    std::filesystem::remove(out.file(found.file("loss.png")), ignored);  // none of an earlier run
+  } else {
+    out.draw(found.file("loss.png"), loss_chart(result.fit, variables, found.title("Inference")));
+  }
+  write_misfit(out.file(found.file("residual.csv")), result.misfit);
+  Chart misfit = misfit_chart(result.misfit);
+  misfit.title = found.title(misfit.title.c_str());
+  out.draw(found.file("residual.png"), misfit);
+  const Trajectory seen = observed_trajectory(result.seen);
+  plot_particles(out.file(found.file("frames.png")),
+                 frames_picture({{"observed", &seen}, {"fitted", &result.fitted}}, 5,
+                                found.observation.cloud > 0));
+  show(found, variables, out.report());
+  Metrics own;
+  add_metrics(own, result, found.observation, variables);
+  for (const auto& [name, value] : own.entries()) metrics.set(found.metric(name), value);
+}
+
+/// Returns whether there is an answer.
+bool print_found(const Found& found, const FitVariables& variables) {
+  const Inference& result = found.result;
+  if (!found.name.empty()) std::printf("%s\n", found.name.c_str());
+  std::printf("fit_mse %.3e m^2, root/size %.3f %%, best start %.3e m^2, %d roll-outs\n",
+              result.fit_mse, 100 * std::sqrt(result.fit_mse) / result.size, result.best_start,
+              result.roll_outs);
+  std::fputs(rung_table(result.rung, result.rungs).c_str(), stdout);
+  std::fputs(fit_summary(result.fit, variables).c_str(), stdout);
+  if (result.fit.determined) std::fputs(belief_text(result.material).c_str(), stdout);
+  std::fflush(stdout);
+  return result.fit.determined;
+}
+
+void run(const ObservationSource& observed, const FitVariablesSource& source,
+         const FitOptions& options, const AdaptationOptions& adaptation, RunDirectory& out,
+         Metrics& metrics) {
+  std::error_code ignored;
+  if (std::filesystem::equivalent(source.model, out.file("model.h5"), ignored)) {
     throw Error(source.model.string() +
                 ": law.model: expected a file that this run does not write, "
                 "found the model.h5 of its own folder");
   }
-  const std::filesystem::path& file = observed.file;
+  const std::string file = observed.file.string();
   std::vector<std::string> warnings;
-  const Observation observation = observed.load(warnings);
+  const std::vector<ObservedBody> bodies = observed.load(warnings);
   const auto variables = source.load();
   FitHooks hooks;
   hooks.state_file = out.file("state.h5");
-  hooks.fingerprint = fit_fingerprint(observation, *variables, out.config_yaml());
-  const Inference result =
-      infer(observation, file.string(), *variables, options, hooks, adaptation);
-
-  const std::string model = write_adapted(result, observation, source.model, out);
-  write_latent(out.file("latent.h5"),
-               latent_of(result, observation, *variables, model, out.config_yaml()));
-  write_trajectory(out.file("trajectory.h5"), result.fitted);
-  std::error_code ignored;
-  if (result.fit.history.empty()) {
-    std::filesystem::remove(out.file("loss.png"), ignored);  // none of an earlier run
+  for (const ObservedBody& body : bodies)
+    hooks.fingerprint += fit_fingerprint(body.motion, *variables, out.config_yaml());
+  BodiesInference result;
+  const bool several = bodies.size() > 1 || !bodies.front().name.empty();
+  if (several) {
+    result = infer_bodies(bodies, file, *variables, options, hooks, adaptation);
   } else {
-    out.draw("loss.png", loss_chart(result.fit, *variables, "Inference"));
+    result.bodies.push_back(
+        infer(bodies.front().motion, file, *variables, options, hooks, adaptation));
+    result.state_files = {hooks.state_file, adaptation_state_file(hooks.state_file)};
   }
-  write_misfit(out.file("residual.csv"), result.misfit);
-  out.draw("residual.png", misfit_chart(result.misfit));
-  const Trajectory seen = observed_trajectory(result.seen);
-  plot_particles(
-      out.file("frames.png"),
-      frames_picture({{"observed", &seen}, {"fitted", &result.fitted}}, 5, observation.cloud > 0));
-  show(result, *variables, out.report());
-  add_metrics(metrics, result, observation, *variables);
-  std::filesystem::remove(hooks.state_file, ignored);  // a finished fit is not resumed
-  std::filesystem::remove(adaptation_state_file(hooks.state_file), ignored);
 
-  std::printf("fit_mse %.3e m^2, root/size %.3f %%, best start %.3e m^2, %d roll-outs\n",
-              result.fit_mse, 100 * *metrics.find("fit_root_over_size"), result.best_start,
-              result.roll_outs);
-  std::fputs(rung_table(result.rung, result.rungs).c_str(), stdout);
-  std::fputs(fit_summary(result.fit, *variables).c_str(), stdout);
-  if (result.fit.determined) {
-    std::fputs(belief_text(result.material).c_str(), stdout);
-  } else {
-    out.set_no_answer();
+  bool answers = true;
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    const std::string& name = bodies[b].name;
+    const Found found{name, several ? name + "/" : "", bodies[b].motion, result.bodies[b]};
+    write_found(found, *variables, source.model, out, metrics);
+    answers = print_found(found, *variables) && answers;
+    for (const std::string& warning : fit_warnings(found.result, found.observation, *variables))
+      warnings.push_back(several ? name + ": " + warning : warning);
+    if (several) {
+      metrics.set(found.metric("group"), result.group[b]);
+      metrics.set(found.metric("fits"), result.rounds[b]);
+    }
   }
-  std::fflush(stdout);
-  for (const std::string& warning : fit_warnings(result, observation, *variables))
-    warnings.push_back(warning);
+  if (!answers) out.set_no_answer();
+  for (const std::filesystem::path& state : result.state_files)
+    std::filesystem::remove(state, ignored);  // a finished fit is not resumed
   for (const std::string& warning : warnings) {
     std::fprintf(stderr, "warning: %s: %s\n", file.c_str(), warning.c_str());
   }
@@ -116,7 +162,10 @@ int main(int argc, char** argv) {
        "DIR/loss.png        loss of every candidate, where gradients were followed",
        "DIR/frames.png      observed and fitted",
        "DIR/residual.csv    what the fitted law leaves over time, residual.png the same as a chart",
-       "DIR/state.h5        while it runs: where it can be resumed, with adaptation_state.h5"},
+       "DIR/state.h5        while it runs: where it can be resumed, with adaptation_state.h5",
+       "DIR/NAME/...        these files for each of several bodies, which are fitted with each "
+       "other "
+       "moving along where they meet"},
       {"uniphy_simulate configs/simulate/benchmark_cube.yaml --set output.observation=true --set "
        "scene.steps=400 --out out/cube",
        "uniphy_infer configs/infer/latent.yaml --set observation=out/cube/observation.h5 --out "

@@ -6,14 +6,37 @@
 
 namespace {
 
-void show(const uniphy::Observation& all, const uniphy::Observation& seen, uniphy::Report* report) {
+using uniphy::ObservedBody;
+
+/// As a laboratory would see the bodies: each with a noise and points of its own.
+std::vector<ObservedBody> view_of(const std::vector<ObservedBody>& all,
+                                  uniphy::LaboratoryView view) {
+  std::vector<ObservedBody> seen;
+  for (const ObservedBody& body : all) {
+    try {
+      seen.push_back({body.name, laboratory_view(body.motion, view)});
+    } catch (const uniphy::Error& error) {
+      if (body.name.empty()) throw;
+      throw uniphy::Error(body.name + ": " + error.what());
+    }
+    ++view.seed;
+  }
+  return seen;
+}
+
+void show(const std::vector<ObservedBody>& all, const std::vector<ObservedBody>& seen,
+          uniphy::Report* report) {
   if (report == nullptr) return;
-  const double wall = seen.bound / double(seen.grid);
-  report->playbacks.push_back({"Observation",
-                               {motion_of("all there is", all), motion_of("observed", seen)},
-                               {},
-                               wall,
-                               1 - wall});
+  for (std::size_t b = 0; b < all.size(); ++b) {
+    const uniphy::Observation& o = seen[b].motion;
+    const double wall = o.bound / double(o.grid);
+    report->playbacks.push_back(
+        {all[b].name.empty() ? "Observation" : all[b].name,
+         {motion_of("all there is", all[b].motion), motion_of("observed", o)},
+         {},
+         wall,
+         1 - wall});
+  }
 }
 
 }  // namespace
@@ -24,7 +47,8 @@ int main(int argc, char** argv) {
       "Makes of an observation that shows everything what a laboratory would see: a part of the "
       "points or clouds without correspondence, some of the frames, noise, hidden points.",
       {"CONFIG.yaml         what is seen",
-       "observation.h5      as uniphy_simulate writes it with output.observation=true"},
+       "observation.h5      of one body or of several, as uniphy_simulate writes it with "
+       "output.observation=true"},
       {"DIR/observation.h5  what is left of it (layout: uniphy/io/observation.hpp)"},
       {"uniphy_observe configs/observe/tracked.yaml --set observation=out/cube/observation.h5"}};
   return uniphy::run_experiment(
@@ -57,22 +81,26 @@ int main(int argc, char** argv) {
         view.seed = static_cast<std::uint64_t>(
             config.integer("seed", 1, between(0, 9e15), "", "of all that is drawn"));
         return [=](uniphy::RunDirectory& out, uniphy::Metrics& metrics) {
-          uniphy::Observation all, seen;
+          std::vector<ObservedBody> all, seen;
           try {
-            all = uniphy::read_observation(file);
-            seen = laboratory_view(all, view);
+            all = uniphy::read_observed_bodies(file);
+            seen = view_of(all, view);
           } catch (const uniphy::Error& error) {
             const std::string text = error.what(), name = file.string();
             throw uniphy::Error(text.rfind(name, 0) == 0 ? text : name + ": " + text);
           }
-          write_observation(out.file("observation.h5"), seen);
+          write_observed_bodies(out.file("observation.h5"), seen);
           show(all, seen, out.report());
-          metrics.set("points", static_cast<double>(seen.points()));
-          metrics.set("frames", static_cast<double>(seen.frames));
-          metrics.set("noise", seen.noise);
-          std::printf("%lld points in %lld frames, noise %.3g m: %s\n",
-                      static_cast<long long>(seen.points()), static_cast<long long>(seen.frames),
-                      seen.noise, out.file("observation.h5").c_str());
+          for (const auto& [name, o] : seen) {
+            const std::string suffix = name.empty() ? "" : "." + name;
+            metrics.set("points" + suffix, static_cast<double>(o.points()));
+            metrics.set("frames" + suffix, static_cast<double>(o.frames));
+            metrics.set("noise" + suffix, o.noise);
+            std::printf("%s%lld points in %lld frames, noise %.3g m: %s\n",
+                        name.empty() ? "" : (name + ": ").c_str(),
+                        static_cast<long long>(o.points()), static_cast<long long>(o.frames),
+                        o.noise, out.file("observation.h5").c_str());
+          }
         };
       });
 }

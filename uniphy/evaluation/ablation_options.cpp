@@ -4,7 +4,7 @@
 
 #include <set>
 
-#include "uniphy/evaluation/row_name.hpp"
+#include "uniphy/io/plain_name.hpp"
 
 namespace uniphy {
 namespace {

@@ -9,6 +9,7 @@
 #include "uniphy/evaluation/materials_stage.hpp"
 #include "uniphy/evaluation/open_world_stage.hpp"
 #include "uniphy/evaluation/outside_stage.hpp"
+#include "uniphy/evaluation/touching_stage.hpp"
 #include "uniphy/io/atomic_file.hpp"
 #include "uniphy/report/plot.hpp"
 #include "uniphy/scene/comparison.hpp"
@@ -104,6 +105,8 @@ RunFunction evaluate_stage(Section& config) {
         [&run](Section& keys) { run = outside_stage(keys); }},
        {"open_world", "forecasts from what a laboratory sees: noise, tracked points, finer truths",
         [&run](Section& keys) { run = open_world_stage(keys); }},
+       {"touching", "two bodies of two materials that push each other, a code for each",
+        [&run](Section& keys) { run = touching_stage(keys); }},
        {"materials", "what held-out objects are made of, read off their motion, with intervals",
         [&run](Section& keys) { run = materials_stage(keys); }}},
       "what is evaluated");

@@ -25,20 +25,6 @@ Observation judged(const JudgedMotion& motion, const Observation& from) {
   return all;
 }
 
-double second_half(const JudgedMotion& motion, const Observation& from,
-                   const kernels::LawDescription& law, const InitialState& initial,
-                   const std::string& dtype) {
-  const Observation all = judged(motion, from);
-  const ObservedSteps steps = observed_steps(all, motion.name);
-  const kernels::GridSettings grid = observed_grid(all, motion.name);
-  const auto objective = make_motion_objective(all, steps, grid, dtype);
-  const std::vector<double> mse = objective->frame_mse(law, initial, all.frames);
-  const std::int64_t first = fitted_frames(all);
-  double sum = 0;
-  for (std::int64_t f = first; f < all.frames; ++f) sum += mse[static_cast<std::size_t>(f)];
-  return std::sqrt(sum / static_cast<double>(all.frames - first)) / observed_size(motion.seen);
-}
-
 }  // namespace
 
 Forecast forecast(const JudgedMotion& motion, const FitVariables& variables,
@@ -54,7 +40,8 @@ Forecast forecast(const JudgedMotion& motion, const FitVariables& variables,
   if (result.fit.determined) f.nearest = variables.nearest(result.fit.u, 1).front().code;
   f.material = result.material.reading.material;
   f.roll_outs = result.roll_outs;
-  f.forecast = second_half(motion, result.seen, result.fit.law, result.fit.motion, options.dtype);
+  f.forecast =
+      forecast_error(motion, result.seen, result.fit.law, result.fit.motion, options.dtype, {});
   return f;
 }
 
@@ -75,7 +62,22 @@ Forecast forecast_or_failure(const JudgedMotion& motion, const std::string& by,
 
 double forecast_error(const JudgedMotion& motion, const kernels::LawDescription& law,
                       const InitialState& initial, const std::string& dtype) {
-  return second_half(motion, motion.seen, law, initial, dtype);
+  return forecast_error(motion, motion.seen, law, initial, dtype, {});
+}
+
+double forecast_error(const JudgedMotion& motion, const Observation& from,
+                      const kernels::LawDescription& law, const InitialState& initial,
+                      const std::string& dtype, const std::vector<Companion>& companions) {
+  const Observation all = judged(motion, from);
+  const ObservedSteps steps = observed_steps(all, motion.name);
+  const kernels::GridSettings grid = observed_grid(all, motion.name);
+  const auto objective =
+      make_motion_objective(all, steps, grid, dtype, "fused", CloudDetail::all, companions);
+  const std::vector<double> mse = objective->frame_mse(law, initial, all.frames);
+  const std::int64_t first = fitted_frames(all);
+  double sum = 0;
+  for (std::int64_t f = first; f < all.frames; ++f) sum += mse[static_cast<std::size_t>(f)];
+  return std::sqrt(sum / static_cast<double>(all.frames - first)) / observed_size(motion.seen);
 }
 
 }  // namespace uniphy

@@ -43,5 +43,9 @@ Forecast forecast_or_failure(const JudgedMotion& motion, const std::string& by,
 /// where the roll-out fails.
 double forecast_error(const JudgedMotion& motion, const kernels::LawDescription& law,
                       const InitialState& initial, const std::string& dtype);
+/// The same of a body whose points start as in `from`, with others in the scene.
+double forecast_error(const JudgedMotion& motion, const Observation& from,
+                      const kernels::LawDescription& law, const InitialState& initial,
+                      const std::string& dtype, const std::vector<Companion>& companions);
 
 }  // namespace uniphy

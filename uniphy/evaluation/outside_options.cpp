@@ -5,7 +5,7 @@
 #include <set>
 
 #include "uniphy/data/material_ranges.hpp"
-#include "uniphy/evaluation/row_name.hpp"
+#include "uniphy/io/plain_name.hpp"
 
 namespace uniphy {
 namespace {

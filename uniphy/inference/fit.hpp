@@ -35,6 +35,7 @@ struct FitOptions {
   double prior_sigma = 1;  ///< σ
   double pull = 0;         ///< weight of FitVariables::departure, likewise
   double clip = 10;
+  std::vector<Companion> companions;  ///< other bodies of the scene, with laws that are given
   int patience = 8;  ///< a candidate is left as it is after so many evaluations without 1 % gained
   std::vector<FitStage> stages;  ///< the last one has horizon 1
 };

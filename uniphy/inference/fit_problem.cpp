@@ -67,7 +67,7 @@ FitProblem::FitProblem(const Observation& observation, const std::string& name,
       observed_(numbers_of(motion_)),
       units_(units_of(motion_.degree)),
       objective_(make_motion_objective(observation, steps_, grid_, options.dtype, options.rollout,
-                                       options.detail)) {
+                                       options.detail, options.companions)) {
   if (options.stages.empty() || options.stages.back().horizon < 1) {
     throw Error("stages: expected a last stage with horizon 1");
   }

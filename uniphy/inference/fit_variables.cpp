@@ -146,6 +146,34 @@ class AnalyticFitVariables : public FitVariables {
   std::vector<std::vector<double>> starts_;
 };
 
+class StartedFitVariables : public FitVariables {
+ public:
+  StartedFitVariables(const FitVariables& variables, std::vector<double> u)
+      : of_(variables), u_(std::move(u)), label_(variables.nearest(u_, 1).front().material) {}
+
+  int size() const override { return of_.size(); }
+  ops::RolloutBody body(const torch::Tensor& u, std::ptrdiff_t particles) const override {
+    return of_.body(u, particles);
+  }
+  torch::Tensor prior(const torch::Tensor& u) const override { return of_.prior(u); }
+  torch::Tensor departure(const torch::Tensor& u) const override { return of_.departure(u); }
+  int starts() const override { return of_.starts() + 1; }
+  std::vector<double> start(int i) const override { return is_added(i) ? u_ : of_.start(i); }
+  std::string label(int i) const override { return is_added(i) ? label_ : of_.label(i); }
+  std::optional<kernels::LawDescription> origin(int i) const override {
+    return is_added(i) ? std::nullopt : of_.origin(i);
+  }
+  std::vector<std::array<double, 2>> ranges() const override { return of_.ranges(); }
+  std::array<double, 2> training_dt() const override { return of_.training_dt(); }
+
+ private:
+  bool is_added(int i) const { return i == of_.starts(); }
+
+  const FitVariables& of_;
+  std::vector<double> u_;
+  std::string label_;
+};
+
 }  // namespace
 
 kernels::LawDescription FitVariables::law(const torch::Tensor& u) const {
@@ -178,6 +206,11 @@ std::vector<NearestCode> FitVariables::nearest(const std::vector<double>& u, int
 
 std::unique_ptr<const FitVariables> make_latent_variables(const ModelFile& model) {
   return std::make_unique<LatentFitVariables>(model);
+}
+
+std::unique_ptr<const FitVariables> with_start(const FitVariables& variables,
+                                               const std::vector<double>& u) {
+  return std::make_unique<StartedFitVariables>(variables, u);
 }
 
 std::unique_ptr<const FitVariables> make_analytic_variables(

@@ -56,6 +56,11 @@ class FitVariables {
 /// spread of 0 counts as 1). It starts from those codes.
 std::unique_ptr<const FitVariables> make_latent_variables(const ModelFile& model);
 
+/// The same variables with one more start, the last one: u, called as the known point nearest to
+/// it. `variables` must outlive it.
+std::unique_ptr<const FitVariables> with_start(const FitVariables& variables,
+                                               const std::vector<double>& u);
+
 /// The parameters of an analytic law: u = (log p − middle)/half width over `ranges` of the
 /// logarithm, one [low, high] for each of law_parameters(id). Starts are drawn from them; a fit may
 /// leave them. A parameter with low = high is a constant and has no place in u. Throws Error where

@@ -112,17 +112,21 @@ ObservationSource read_observation_source(Section& config) {
   return source;
 }
 
-Observation ObservationSource::load(std::vector<std::string>& warnings) const {
-  Observation seen = at_resolution(read_observation(file), resolution, file.string(), warnings);
-  if (noise > 0) seen.noise = noise;
-  seen.cloud_distance = cloud_distance;
-  if (start_degree >= 0) seen.start_degree = start_degree;
-  if (seen.cloud > 0 && seen.start_degree > 0) {
-    throw Error(
-        fmt::format("{}: start_degree: expected 0 for clouds without correspondence, found {}",
-                    file.string(), seen.start_degree));
+std::vector<ObservedBody> ObservationSource::load(std::vector<std::string>& warnings) const {
+  std::vector<ObservedBody> bodies = read_observed_bodies(file);
+  for (auto& [body, seen] : bodies) {
+    const std::string name = body.empty() ? file.string() : file.string() + ": " + body;
+    seen = at_resolution(seen, resolution, name, warnings);
+    if (noise > 0) seen.noise = noise;
+    seen.cloud_distance = cloud_distance;
+    if (start_degree >= 0) seen.start_degree = start_degree;
+    if (seen.cloud > 0 && seen.start_degree > 0) {
+      throw Error(
+          fmt::format("{}: start_degree: expected 0 for clouds without correspondence, found {}",
+                      name, seen.start_degree));
+    }
   }
-  return seen;
+  return bodies;
 }
 
 FitVariablesSource read_fit_variables(Section& config) {

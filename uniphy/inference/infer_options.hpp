@@ -24,9 +24,9 @@ struct ObservationSource {
   std::string cloud_distance = "transport";  ///< Observation::cloud_distance
   int start_degree = -1;  ///< Observation::start_degree in place of the file's; −1: that
 
-  /// Reads the file and fills the body where it has to be; adds what was mended in its surface to
-  /// `warnings`. Throws Error that names the file.
-  Observation load(std::vector<std::string>& warnings) const;
+  /// Reads the file and fills the bodies where they have to be; adds what was mended in a surface
+  /// to `warnings`. Throws Error that names the file.
+  std::vector<ObservedBody> load(std::vector<std::string>& warnings) const;
 };
 
 /// Declares and reads the keys observation, noise, cloud_distance, start_degree and resolution.

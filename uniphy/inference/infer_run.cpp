@@ -98,9 +98,15 @@ Trajectory observed_trajectory(const Observation& observation) {
 Inference infer(const Observation& observation, const std::string& name,
                 const FitVariables& variables, const FitOptions& options, const FitHooks& hooks,
                 const AdaptationOptions& adaptation) {
+  return conclude(
+      adapt(with_known_starts(observation, name), name, variables, options, adaptation, hooks),
+      name, variables, options, adaptation);
+}
+
+Inference conclude(const Adaptation& adapted, const std::string& name,
+                   const FitVariables& variables, const FitOptions& options,
+                   const AdaptationOptions& adaptation) {
   Inference result;
-  const Adaptation adapted =
-      adapt(with_known_starts(observation, name), name, variables, options, adaptation, hooks);
   result.fit = adapted.fit;
   result.rung = adapted.rung;
   result.rungs = adapted.rungs;
@@ -112,7 +118,8 @@ Inference infer(const Observation& observation, const std::string& name,
   const ObservedSteps steps = observed_steps(seen, name);
   const kernels::GridSettings grid = observed_grid(seen, name);
   result.check = check_observation(seen, steps, grid);
-  const auto objective = make_motion_objective(seen, steps, grid, options.dtype);
+  const auto objective = make_motion_objective(seen, steps, grid, options.dtype, "fused",
+                                               CloudDetail::all, options.companions);
   objective->simulate(result.fit.law, result.fit.motion,
                       [&](std::ptrdiff_t, const std::vector<double>& x) {
                         result.fitted.x.insert(result.fitted.x.end(), x.begin(), x.end());

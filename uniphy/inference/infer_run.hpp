@@ -43,6 +43,10 @@ struct Inference {
 Inference infer(const Observation& observation, const std::string& name,
                 const FitVariables& variables, const FitOptions& options, const FitHooks& hooks,
                 const AdaptationOptions& adaptation = {{Rung::latent}});
+/// What infer() makes of a finished fit: rolls it out and reads it.
+Inference conclude(const Adaptation& adapted, const std::string& name,
+                   const FitVariables& variables, const FitOptions& options,
+                   const AdaptationOptions& adaptation);
 
 /// Whether noise and tolerance account for the misfit of all frames, and, where frames were kept,
 /// for the error there of the rung chosen before it saw them (Misfit::allowed_ahead).

@@ -25,24 +25,22 @@ class RolloutObjective : public MotionObjective {
  public:
   RolloutObjective(const Observation& observation, const ObservedSteps& steps,
                    const kernels::GridSettings& grid, const std::string& rollout,
-                   CloudDetail detail)
+                   CloudDetail detail, const std::vector<Companion>& companions)
       : observation_(observation),
         steps_(steps),
         grid_(grid),
         rollout_(rollout == "stepwise" ? &stepwise_rollout : &ops::rollout),
         particles_(observation.particles),
-        points_(observation.cloud > 0 ? observation.particles : observation.points()) {
-    const std::vector<double> mass = observed_mass(observation);
-    mass_.assign(mass.begin(), mass.end());
-    volume_.assign(observation.volume.begin(), observation.volume.end());
-    start_ = observation.start();
-    start_.insert(start_.end(), observation.tracers.begin(), observation.tracers.end());
-    mass_.resize(start_.size() / 3, T(0));
-    volume_.resize(start_.size() / 3, T(0));
+        points_(observation.cloud > 0 ? observation.particles : observation.points()),
+        companions_(companions),
+        beside_(fields_beside(companions)),
+        tracers_(observation.tracers),
+        all_(ensemble(tracers_)),
+        first_point_(observation.tracked() ? all_.material() : 0) {
     const torch::Dtype dtype = torch::CppTypeToScalarType<T>::value;
-    x0_ = torch::tensor(start_, torch::kFloat64).to(dtype).view({-1, 3});
-    mass_tensor_ = torch::tensor(mass_, dtype);
-    volume_tensor_ = torch::tensor(volume_, dtype);
+    x0_ = torch::tensor(all_.x, torch::kFloat64).to(dtype).view({-1, 3});
+    mass_tensor_ = torch::tensor(all_.mass, dtype);
+    volume_tensor_ = torch::tensor(all_.volume, dtype);
     if (observation.cloud > 0) {
       clouds_ = std::make_unique<const CloudComparison>(observation, detail);
       per_frame_ = clouds_->seen_per_frame();
@@ -72,17 +70,23 @@ class RolloutObjective : public MotionObjective {
     settings.steps = steps_.last(frames);
     settings.every = steps_.stride;
     std::vector<ops::RolloutBody> bodies{body};
-    const std::int64_t all = x0_.size(0);
-    if (all > particles_) {
+    for (const Companion& c : companions_) {
+      ops::RolloutBody& other = bodies.emplace_back();
+      other.begin = bodies[bodies.size() - 2].end;
+      other.end = other.begin + static_cast<std::ptrdiff_t>(c.volume.size());
+      other.law = c.law;
+    }
+    if (!tracers_.empty()) {
       ops::RolloutBody& tracers = bodies.emplace_back();
-      tracers.begin = particles_;
-      tracers.end = all;
+      tracers.begin = all_.material();
+      tracers.end = x0_.size(0);
       tracers.tracers = true;
     }
+    const InitialFields fields = with_companions(start);
     const auto cast = [&](const Tensor& t) { return t.defined() ? t.to(x0_.dtype()) : t; };
-    const Tensor states = rollout_(x0_, cast(start.v), cast(start.C), cast(start.F), mass_tensor_,
-                                   volume_tensor_, bodies, settings, {})
-                              .x.slice(1, all - points_, all)
+    const Tensor states = rollout_(x0_, cast(fields.v), cast(fields.C), cast(fields.F),
+                                   mass_tensor_, volume_tensor_, bodies, settings, {})
+                              .x.slice(1, first_point_, first_point_ + points_)
                               .flatten(1)
                               .to(torch::kFloat64);
     const Tensor x = at_frames(states, frames);
@@ -98,8 +102,7 @@ class RolloutObjective : public MotionObjective {
     if (clouds_ != nullptr) return cloud_mse(law, from, frames);
     std::vector<double> result(frames, kInfinity);
     try {
-      const kernels::Rollout<T> rollout = rollout_of(law);
-      visit_frames(rollout, initial(from), steps_, frames,
+      visit_frames(rollout_of(law, all_), initial(from), steps_, frames,
                    [&](std::ptrdiff_t frame, const std::vector<T>& x) {
                      const double mse = frame_error(points_of(x), frame);
                      if (std::isfinite(mse)) result[frame] = mse;
@@ -112,36 +115,28 @@ class RolloutObjective : public MotionObjective {
   void simulate(const kernels::LawDescription& law, const InitialState& from,
                 const std::function<void(std::ptrdiff_t, const std::vector<double>&)>& on_frame)
       const override {
-    const kernels::Rollout<T> rollout = rollout_of(law);
-    visit_frames(rollout, initial(from), steps_, observation_.frames,
+    visit_frames(rollout_of(law, all_), initial(from), steps_, observation_.frames,
                  [&](std::ptrdiff_t frame, const std::vector<T>& x) {
-                   on_frame(frame, std::vector<double>(points_of(x), x.data() + x.size()));
+                   on_frame(frame, {points_of(x), points_of(x) + 3 * points_});
                  });
   }
 
   Tensor flow_gradients(const kernels::LawDescription& law, const InitialState& from,
                         std::ptrdiff_t frames) const override {
     // Of points that are particles, too, tracers tell: the F of a particle is what its law leaves.
-    std::vector<double> start(start_.begin(), start_.begin() + 3 * particles_);
-    start.insert(start.end(), start_.end() - 3 * points_, start_.end());
-    std::vector<T> mass(mass_.begin(), mass_.begin() + particles_);
-    std::vector<T> volume(volume_.begin(), volume_.begin() + particles_);
-    mass.resize(start.size() / 3, T(0));
-    volume.resize(start.size() / 3, T(0));
-    const kernels::Rollout<T> rollout(
-        grid_,
-        {{0, particles_, kernels::make_law<T>(law)},
-         {particles_, particles_ + points_, std::make_shared<const kernels::Tracer<T>>()}},
-        mass, volume);
-    return torch::tensor(
-               gradients(rollout, state_of(from, start), frames, particles_, particles_ + points_),
-               torch::kFloat64)
+    const std::vector<double> starts(all_.x.begin() + 3 * first_point_,
+                                     all_.x.begin() + 3 * (first_point_ + points_));
+    const Ensemble points = ensemble(starts);
+    const std::int64_t begin = points.material();
+    return torch::tensor(gradients(rollout_of(law, points), state_of(from, points, starts), frames,
+                                   begin, begin + points_),
+                         torch::kFloat64)
         .view({frames, points_, 3, 3});
   }
 
   std::vector<double> deformations(const kernels::LawDescription& law, const InitialState& from,
                                    std::ptrdiff_t frames) const override {
-    return gradients(rollout_of(law), initial(from), frames, 0, particles_);
+    return gradients(rollout_of(law, all_), initial(from), frames, 0, particles_);
   }
 
  private:
@@ -158,9 +153,9 @@ class RolloutObjective : public MotionObjective {
     const torch::NoGradGuard no_grad;
     std::vector<double> all, result(frames, kInfinity);
     try {
-      visit_frames(rollout_of(law), initial(from), steps_, frames,
+      visit_frames(rollout_of(law, all_), initial(from), steps_, frames,
                    [&](std::ptrdiff_t, const std::vector<T>& x) {
-                     all.insert(all.end(), x.begin(), x.end());
+                     all.insert(all.end(), x.begin(), x.begin() + 3 * particles_);
                    });
     } catch (const Error&) {  // left the grid: the later frames stay infinite
     }
@@ -174,12 +169,83 @@ class RolloutObjective : public MotionObjective {
     return result;
   }
 
-  kernels::Rollout<T> rollout_of(const kernels::LawDescription& law) const {
+  /// All that is rolled out: the body, its companions, tracers.
+  struct Ensemble {
+    std::vector<double> x;          ///< [all, 3] m
+    std::vector<T> mass, volume;    ///< [all]
+    std::vector<std::int64_t> end;  ///< of the body and of each companion
+
+    std::int64_t material() const { return end.back(); }
+  };
+  Ensemble ensemble(const std::vector<double>& tracers) const {
+    Ensemble e;
+    e.x = observation_.start();
+    const std::vector<double> mass = observed_mass(observation_);
+    e.mass.assign(mass.begin(), mass.end());
+    e.volume.assign(observation_.volume.begin(), observation_.volume.end());
+    e.end.push_back(particles_);
+    for (const Companion& c : companions_) {
+      e.x.insert(e.x.end(), c.x.begin(), c.x.end());
+      for (const double volume : c.volume) {
+        e.volume.push_back(static_cast<T>(volume));
+        e.mass.push_back(static_cast<T>(c.density * volume));
+      }
+      e.end.push_back(static_cast<std::int64_t>(e.volume.size()));
+    }
+    e.x.insert(e.x.end(), tracers.begin(), tracers.end());
+    e.mass.resize(e.x.size() / 3, T(0));
+    e.volume.resize(e.x.size() / 3, T(0));
+    return e;
+  }
+
+  kernels::Rollout<T> rollout_of(const kernels::LawDescription& law, const Ensemble& e) const {
     std::vector<kernels::BodyRange<T>> bodies{{0, particles_, kernels::make_law<T>(law)}};
-    const auto all = static_cast<std::ptrdiff_t>(mass_.size());
-    if (all > particles_)
-      bodies.push_back({particles_, all, std::make_shared<const kernels::Tracer<T>>()});
-    return {grid_, bodies, mass_, volume_};
+    for (std::size_t c = 0; c < companions_.size(); ++c)
+      bodies.push_back({e.end[c], e.end[c + 1], kernels::make_law<T>(companions_[c].law)});
+    const auto all = static_cast<std::ptrdiff_t>(e.mass.size());
+    if (all > e.material())
+      bodies.push_back({e.material(), all, std::make_shared<const kernels::Tracer<T>>()});
+    return {grid_, bodies, e.mass, e.volume};
+  }
+
+  /// Of the particles of all companions.
+  static InitialFields fields_beside(const std::vector<Companion>& companions) {
+    std::vector<InitialFields> each;
+    bool still = true;  // C = 0 and F = I
+    for (const Companion& c : companions) {
+      const auto particles = static_cast<std::int64_t>(c.volume.size());
+      still = !each.emplace_back(fields_of(c.motion, c.x, particles)).C.defined() && still;
+    }
+    if (each.empty()) return {};
+    std::vector<Tensor> v, C, F;
+    for (const InitialFields& f : each) {
+      v.push_back(f.v);
+      C.push_back(or_zeros(f.C, f.v.size(0)));
+      F.push_back(or_identity(f.F, f.v.size(0)));
+    }
+    if (still) return {torch::cat(v), {}, {}};
+    return {torch::cat(v), torch::cat(C), torch::cat(F)};
+  }
+  static Tensor or_zeros(const Tensor& C, std::int64_t rows) {
+    return C.defined() ? C : torch::zeros({rows, 3, 3}, torch::kFloat64);
+  }
+  static Tensor or_identity(const Tensor& F, std::int64_t rows) {
+    return F.defined() ? F : torch::eye(3, torch::kFloat64).expand({rows, 3, 3});
+  }
+
+  /// The fields of the body and of tracers, with those of the companions between them.
+  InitialFields with_companions(const InitialFields& own) const {
+    if (companions_.empty()) return own;
+    const std::int64_t rows = own.v.size(0), others = beside_.v.size(0);
+    const auto joined = [&](const Tensor& mine, const Tensor& theirs) {
+      return torch::cat({mine.slice(0, 0, particles_), theirs, mine.slice(0, particles_, rows)});
+    };
+    InitialFields all{joined(own.v, beside_.v)};
+    if (own.C.defined() || beside_.C.defined()) {
+      all.C = joined(or_zeros(own.C, rows), or_zeros(beside_.C, others));
+      all.F = joined(or_identity(own.F, rows), or_identity(beside_.F, others));
+    }
+    return all;
   }
 
   /// F of the particles [begin, end) at the first frames; within a step it hardly changes.
@@ -200,13 +266,15 @@ class RolloutObjective : public MotionObjective {
   }
 
   kernels::ParticleState<T> initial(const InitialState& from) const {
-    return state_of(from, start_);
+    return state_of(from, all_, tracers_);
   }
-
-  /// Of particles and of tracers behind them.
-  kernels::ParticleState<T> state_of(const InitialState& from, const std::vector<double>& x) const {
-    const InitialFields fields = fields_of(from, x, particles_);
-    auto state = kernels::ParticleState<T>::undeformed({x.begin(), x.end()}, numbers(fields.v));
+  kernels::ParticleState<T> state_of(const InitialState& from, const Ensemble& e,
+                                     const std::vector<double>& tracers) const {
+    std::vector<double> own = observation_.start();
+    own.insert(own.end(), tracers.begin(), tracers.end());
+    const torch::NoGradGuard no_grad;
+    const InitialFields fields = with_companions(fields_of(from, own, particles_));
+    auto state = kernels::ParticleState<T>::undeformed({e.x.begin(), e.x.end()}, numbers(fields.v));
     if (fields.C.defined()) state.C = numbers(fields.C);
     if (fields.F.defined()) state.F = numbers(fields.F);
     return state;
@@ -217,7 +285,7 @@ class RolloutObjective : public MotionObjective {
   }
 
   /// Where the points begin in the positions of all that is rolled out.
-  const T* points_of(const std::vector<T>& x) const { return x.data() + x.size() - 3 * points_; }
+  const T* points_of(const std::vector<T>& x) const { return x.data() + 3 * first_point_; }
 
   /// Frames from states: one of them, or between it and the next one.
   Tensor at_frames(const Tensor& states, std::ptrdiff_t frames) const {
@@ -245,9 +313,12 @@ class RolloutObjective : public MotionObjective {
   kernels::GridSettings grid_;
   decltype(&ops::rollout) rollout_;
   std::int64_t particles_, points_;
-  std::vector<T> mass_, volume_;                   // of particles and tracers
-  std::vector<double> start_;                      // likewise
-  Tensor x0_, mass_tensor_, volume_tensor_;        // the same, in T
+  std::vector<Companion> companions_;
+  InitialFields beside_;         // of the companions; undefined: there are none
+  std::vector<double> tracers_;  // [tracers, 3] m
+  Ensemble all_;
+  std::int64_t first_point_;                       // row of all that the points begin with
+  Tensor x0_, mass_tensor_, volume_tensor_;        // of all, in T
   std::unique_ptr<const CloudComparison> clouds_;  // of clouds, in place of what follows
   Tensor seen_;                                    // [frames, 3 points], float64
   Tensor hidden_;                                  // likewise; undefined: nothing is
@@ -268,12 +339,15 @@ void keep_thread_count() {
 
 std::unique_ptr<const MotionObjective> make_motion_objective(
     const Observation& observation, const ObservedSteps& steps, const kernels::GridSettings& grid,
-    const std::string& dtype, const std::string& rollout, CloudDetail detail) {
+    const std::string& dtype, const std::string& rollout, CloudDetail detail,
+    const std::vector<Companion>& companions) {
   keep_thread_count();
   if (dtype == "float64") {
-    return std::make_unique<RolloutObjective<double>>(observation, steps, grid, rollout, detail);
+    return std::make_unique<RolloutObjective<double>>(observation, steps, grid, rollout, detail,
+                                                      companions);
   }
-  return std::make_unique<RolloutObjective<float>>(observation, steps, grid, rollout, detail);
+  return std::make_unique<RolloutObjective<float>>(observation, steps, grid, rollout, detail,
+                                                   companions);
 }
 
 double mean_of_first(const std::vector<double>& frame_mse, std::ptrdiff_t frames) {

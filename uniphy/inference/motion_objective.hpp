@@ -10,6 +10,7 @@
 #include "ops/kernels/laws/law.hpp"
 #include "ops/rollout/rollout.hpp"
 #include "uniphy/inference/cloud_comparison.hpp"
+#include "uniphy/inference/companion.hpp"
 #include "uniphy/inference/initial_fields.hpp"
 #include "uniphy/inference/observed_motion.hpp"
 
@@ -60,14 +61,13 @@ class MotionObjective {
 };
 
 /// `dtype`, the precision of the roll-outs, is float32 or float64; `rollout` is fused
-/// (ops::rollout) or stepwise (stepwise_rollout); `detail` is that of clouds. The observation must
+/// (ops::rollout) or stepwise (stepwise_rollout); `detail` is that of clouds. `companions` move
+/// along, by their own laws; what is compared is the observed body alone. The observation must
 /// outlive the objective.
-std::unique_ptr<const MotionObjective> make_motion_objective(const Observation& observation,
-                                                             const ObservedSteps& steps,
-                                                             const kernels::GridSettings& grid,
-                                                             const std::string& dtype,
-                                                             const std::string& rollout = "fused",
-                                                             CloudDetail detail = CloudDetail::all);
+std::unique_ptr<const MotionObjective> make_motion_objective(
+    const Observation& observation, const ObservedSteps& steps, const kernels::GridSettings& grid,
+    const std::string& dtype, const std::string& rollout = "fused",
+    CloudDetail detail = CloudDetail::all, const std::vector<Companion>& companions = {});
 
 /// Mean of the first `frames` numbers.
 double mean_of_first(const std::vector<double>& frame_mse, std::ptrdiff_t frames);

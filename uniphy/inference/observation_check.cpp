@@ -95,8 +95,8 @@ void check_start(const Observation& o, const ObservedSteps& steps,
     return turning * static_cast<double>(steps.step[f]) * grid.dt;
   };
   const std::ptrdiff_t most = std::min<std::ptrdiff_t>(kStartFrames, o.frames - 1);
-  while (check.free_frames < most && out_of_reach(o, grid, check.free_frames) &&
-         out_of_reach(o, grid, check.free_frames + 1) &&
+  while (check.free_frames < most && o.time[check.free_frames + 1] - o.time[0] < o.meeting &&
+         out_of_reach(o, grid, check.free_frames) && out_of_reach(o, grid, check.free_frames + 1) &&
          (check.free_frames == 0 || angle(check.free_frames + 1) < kSmallAngle)) {
     ++check.free_frames;
   }
@@ -157,7 +157,9 @@ ObservationCheck check_observation(const Observation& observation, const Observe
   if (observation.start_degree > 0 || observation.cloud > 0) return check;
   const RigidMotion motion = observed_motion(observation, steps, grid);
   check_start(observation, steps, grid, motion, check);
-  if (is_complete(observation)) check_energy(observation, grid, motion, check);
+  // Another body may push it.
+  const bool alone = observation.meeting > observation.time.back() - observation.time.front();
+  if (is_complete(observation) && alone) check_energy(observation, grid, motion, check);
   return check;
 }
 

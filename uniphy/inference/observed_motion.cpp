@@ -215,6 +215,7 @@ Eigen::Isometry3d flight_pose(const ObservedSteps& steps, const kernels::GridSet
 bool reaches_wall(const Observation& observation, const ObservedSteps& steps,
                   const kernels::GridSettings& grid, const RigidMotion& motion,
                   std::ptrdiff_t frame) {
+  if (observation.time[frame] - observation.time[0] >= observation.meeting) return true;
   const Eigen::Isometry3d pose = flight_pose(steps, grid, motion, frame);
   const double low = grid.bound + 0.5, high = grid.n - grid.bound - 0.5;  // in cells
   const std::vector<double> start = observation.start();

@@ -83,17 +83,18 @@ inline constexpr double kFlightAngle = 0.2;
 Eigen::Isometry3d flight_pose(const ObservedSteps& steps, const kernels::GridSettings& grid,
                               const RigidMotion& motion, std::ptrdiff_t frame);
 
-/// Whether the body, moving on as a rigid one, reads a node that a wall stops at the frame.
+/// Whether the body, moving on as a rigid one, reads a node that a wall stops at the frame, or has
+/// met another body until then (Observation::meeting).
 bool reaches_wall(const Observation& observation, const ObservedSteps& steps,
                   const kernels::GridSettings& grid, const RigidMotion& motion,
                   std::ptrdiff_t frame);
 
-/// The first frame at which a wall acts; the number of frames where that never happens. Of a
-/// complete observation it is where the centre of mass has left the parabola of free flight by more
-/// than 1 % of a cell, unless another parabola explains all frames (the motion of the first ones is
-/// noisy). Else it is where the body, flying on as a rigid one, is the first time so near a wall
-/// that it reads its nodes. Of a body that is deformed at the first frame it is that one: stress
-/// acts from there on.
+/// The first frame at which a wall or another body acts; the number of frames where that never
+/// happens. Of a complete observation it is where the centre of mass has left the parabola of free
+/// flight by more than 1 % of a cell, unless another parabola explains all frames (the motion of
+/// the first ones is noisy). Else it is where the body, flying on as a rigid one, is the first time
+/// so near a wall that it reads its nodes. Of a body that is deformed at the first frame it is that
+/// one: stress acts from there on.
 std::ptrdiff_t first_contact(const Observation& observation, const ObservedSteps& steps,
                              const kernels::GridSettings& grid, const RigidMotion& motion);
 

@@ -24,6 +24,13 @@
 // or, in their place, a closed surface that the fit fills with particles:
 //   /body/vertices [vertices, 3]    m
 //   /body/triangles [triangles, 3]  rows of vertices, from 0
+//
+// Of several bodies, in version 2, each is in a group of its own, with the times and the scene of
+// all in common:
+//   /bodies/NAME/x                      as /x, with its attributes
+//   /bodies/NAME/volume                 the points are the particles, as in version 1
+//   /bodies/NAME/body/...               or they are not, as /body
+//           attribute density (kg/m^3) of /bodies/NAME, optional: in the place of that of /scene
 
 #include <array>
 #include <cstdint>
@@ -63,6 +70,9 @@ struct Observation {
   std::string cloud_distance = "transport";
   std::vector<double> vertices;  ///< [vertices, 3] m, the surface of a body without particles
   std::vector<std::int64_t> triangles;  ///< [triangles, 3]
+  /// Seconds from the first frame to when the body meets another one, if it ever does. Found by the
+  /// fit, not in the file.
+  double meeting = std::numeric_limits<double>::infinity();
 
   int grid = 20;
   double dt = 0;  ///< s, of the simulation that explains the observation
@@ -96,7 +106,21 @@ void add_frame(Observation& observation, double time, const std::vector<double>&
 /// Version 1 where the points are the particles, else version 2. Throws Error for what
 /// read_observation would refuse.
 void write_observation(const std::filesystem::path& file, const Observation& observation);
-/// Throws Error for anything that is missing, of the wrong shape, not finite, or out of range.
+/// Throws Error for anything that is missing, of the wrong shape, not finite, or out of range, and
+/// for a file of several bodies.
 Observation read_observation(const std::filesystem::path& file);
+
+/// One of the bodies of an observation; its name is a folder's, too (is_plain_name).
+struct ObservedBody {
+  std::string name;
+  Observation motion;
+};
+/// The bodies of a file, sorted by their names; the only one of a file without /bodies has none.
+/// Throws like read_observation.
+std::vector<ObservedBody> read_observed_bodies(const std::filesystem::path& file);
+/// One body without a name as write_observation does. Throws Error where times or scenes (but for
+/// the density) differ, and for what read_observed_bodies would refuse.
+void write_observed_bodies(const std::filesystem::path& file,
+                           const std::vector<ObservedBody>& bodies);
 
 }  // namespace uniphy

@@ -8,6 +8,7 @@
 
 #include "ops/kernels/base/error.hpp"
 #include "uniphy/io/observation.hpp"
+#include "uniphy/io/plain_name.hpp"
 #include "uniphy/report/plot.hpp"
 #include "uniphy/report/progress.hpp"
 #include "uniphy/scene/continued_run.hpp"
@@ -91,6 +92,38 @@ void draw_frames(const std::filesystem::path& png, const std::filesystem::path& 
   plot_particles(png, picture);
 }
 
+/// What uniphy_infer may see of the bodies.
+class SeenBodies {
+ public:
+  SeenBodies(const SceneDescription& scene, const PlacedScene& placed) : first_(placed.first) {
+    const bool several = scene.bodies.size() > 1;
+    for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
+      const BodyDescription& body = scene.bodies[b];
+      if (several && !is_plain_name(body.name)) {
+        throw Error(
+            fmt::format("output.observation: bodies.{}.name: expected letters, digits, _, - and . "
+                        "(no dot first), found \"{}\"",
+                        b, body.name));
+      }
+      const auto volume = placed.volume.begin();
+      bodies_.push_back({several ? body.name : "",
+                         begin_observation(placed.grid, body.density,
+                                           {volume + first_[b], volume + first_[b + 1]})});
+    }
+  }
+  void add(double time, const std::vector<double>& x) {
+    for (std::size_t b = 0; b < bodies_.size(); ++b) {
+      add_frame(bodies_[b].motion, time,
+                {x.begin() + 3 * first_[b], x.begin() + 3 * first_[b + 1]});
+    }
+  }
+  void write(const std::filesystem::path& file) const { write_observed_bodies(file, bodies_); }
+
+ private:
+  std::vector<std::ptrdiff_t> first_;
+  std::vector<ObservedBody> bodies_;
+};
+
 /// Takes the motion for the report, where there is one.
 class ReportedMotion {
  public:
@@ -156,7 +189,7 @@ SimulationOutput read_simulation_output(Section& config) {
   output.observation = section.boolean(
       "observation", false,
       "also observation.h5, all that uniphy_infer may see: positions, times, walls, "
-      "density and volumes of a single body, nothing about its law");
+      "density and volumes of the bodies, nothing about their laws");
   output.gzip = static_cast<int>(
       section.integer("gzip", 0, between(0, 9), "", "compression of the trajectory, 0: none"));
   output.picture_frames =
@@ -171,10 +204,8 @@ void simulate_into(const SceneDescription& scene, const SimulationOutput& output
     go_on(scene, output, out, &placed);
     metrics.set("first_step", static_cast<double>(placed.start->point.step));
   }
-  if (output.observation && scene.bodies.size() != 1) {
-    throw Error(fmt::format("output.observation: expected a scene of one body, found {}",
-                            scene.bodies.size()));
-  }
+  std::optional<SeenBodies> seen;
+  if (output.observation) seen.emplace(scene, placed);
   record_metrics(scene, placed, metrics);
   for (const std::string& warning : scene_warnings(scene, placed)) {
     fmt::print(stderr, "warning: {}\n", warning);
@@ -187,7 +218,6 @@ void simulate_into(const SceneDescription& scene, const SimulationOutput& output
   header.scene = out.config_yaml();
   TrajectoryWriter writer(out.file("trajectory.h5"), header, output.fields, output.gzip);
 
-  Observation seen = begin_observation(placed.grid, scene.bodies.front().density, placed.volume);
   const std::int64_t first = placed.start ? placed.start->point.step : 0;
   ReportedMotion reported(scene, placed, out);
   Progress progress("simulate", placed.steps);
@@ -202,7 +232,7 @@ void simulate_into(const SceneDescription& scene, const SimulationOutput& output
           storing = true;
           writer.append(time, step, state);
           storing = false;
-          if (output.observation) add_frame(seen, time, state.x);
+          if (seen) seen->add(time, state.x);
           reported.add(time, state);
           progress.update(step - first);
           return true;
@@ -219,7 +249,7 @@ void simulate_into(const SceneDescription& scene, const SimulationOutput& output
   progress.finish();
   metrics.set("frames", static_cast<double>(writer.frames()));
   writer.finish(last, &end);
-  if (output.observation) write_observation(out.file("observation.h5"), seen);
+  if (seen) seen->write(out.file("observation.h5"));
   const double particle_steps =
       static_cast<double>(placed.particles()) * static_cast<double>(placed.steps);
   if (particle_steps > 0) metrics.set("ns_per_particle_step", 1e9 * seconds / particle_steps);

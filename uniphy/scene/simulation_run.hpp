@@ -12,7 +12,7 @@ namespace uniphy {
 struct SimulationOutput {
   FrameFields fields;               ///< stored with every frame besides x
   int gzip = 0;                     ///< 0 … 9
-  bool observation = false;         ///< observation.h5 too, for uniphy_infer; one body only
+  bool observation = false;         ///< observation.h5 too, for uniphy_infer
   std::int64_t picture_frames = 6;  ///< panels of frames.png, 0: no picture
 };
 

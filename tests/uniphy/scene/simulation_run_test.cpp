@@ -63,13 +63,32 @@ TEST(SimulationRun, WritesTheObservationThatInferenceReads) {
   EXPECT_EQ(seen.gravity, (std::array<double, 3>{0, -3, 1}));
 }
 
-TEST(SimulationRun, ObservesSingleBodiesOnly) {
+TEST(SimulationRun, ObservesEachOfSeveralBodies) {
   const testing::Scratch scratch;
-  const Job job = read_job("[" + std::string(kBall) +
-                           ", {name: other, center: [0.8, 0.5, 0.5], size: 0.1, "
-                           "law: {type: water, lambda: 1e4}}]");
-  EXPECT_THAT(testing::error_of([&] { simulate(job, scratch); }),
-              HasSubstr("output.observation: expected a scene of one body, found 2"));
+  const char* other =
+      ", {name: other, center: [0.8, 0.5, 0.5], size: 0.1, density: 900, law: {type: water, "
+      "lambda: "
+      "1e4}}]";
+  simulate(read_job("[" + std::string(kBall) + other), scratch);
+  const std::vector<ObservedBody> seen = read_observed_bodies(scratch.file("observation.h5"));
+  const Trajectory whole = read_trajectory(scratch.file("trajectory.h5"));
+  ASSERT_EQ(seen.size(), 2u);
+  EXPECT_EQ(seen[1].name, "other");
+  EXPECT_EQ(seen[1].motion.density, 900);
+  EXPECT_EQ(seen[0].motion.particles + seen[1].motion.particles, whole.particles);
+  for (std::int64_t f = 0; f < whole.frames; ++f) {
+    const auto of = [&](int b) {
+      const Observation& o = seen[b].motion;
+      return std::vector<double>(o.positions(f), o.positions(f) + 3 * o.particles);
+    };
+    std::vector<double> x = of(0);
+    const std::vector<double> rest = of(1);
+    x.insert(x.end(), rest.begin(), rest.end());
+    EXPECT_EQ(x, std::vector<double>(whole.positions(f), whole.positions(f + 1)));
+  }
+  const Job bad = read_job("[" + std::string(kBall) + ", {name: \"a/b\"" + (other + 14));
+  EXPECT_THAT(testing::error_of([&] { simulate(bad, scratch); }),
+              HasSubstr("output.observation: bodies.1.name: expected letters, digits"));
 }
 
 // Leaves the grid after step 13; frames of steps 0, 2, ... 12.
