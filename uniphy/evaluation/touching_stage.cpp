@@ -92,7 +92,7 @@ SceneDescription touching_scene(const TouchingOptions& o,
     body.filling.count = o.per_side;
     body.placement.size = 0.3;
     body.placement.centre =
-        b == 0 ? Eigen::Vector3d(0.5, 0.28, 0.5) : Eigen::Vector3d(0.53, 0.64, 0.48);
+        b == 0 ? Eigen::Vector3d(0.5, 0.28, 0.5) : Eigen::Vector3d(0.53, 0.70, 0.48);
     body.velocity = b == 0 ? Eigen::Vector3d(0.3, -1, 0) : Eigen::Vector3d(-0.2, -3, 0.2);
     body.angular_velocity = b == 0 ? Eigen::Vector3d(0, 2, 0) : Eigen::Vector3d(2, 0, 3);
     body.law = laws[b];

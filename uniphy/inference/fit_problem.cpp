@@ -60,7 +60,8 @@ FitProblem::FitProblem(const Observation& observation, const std::string& name,
       contact_(first_contact(observation, steps_, grid_, motion_)),
       noise_(observed_noise(observation)),
       fits_velocity_(observation.tracked() || noise_ > kNoisy * size_ ||
-                     observation.start_degree > 0 || observation.cloud > 0),
+                     observation.start_degree > 0 || observation.cloud > 0 ||
+                     meets_by(observation, 1)),
       fits_starts_(observation.cloud == 0 &&
                    (observation.tracked() || noise_ > kNoisyStarts * size_)),
       basis_(starts_of(observation), observation.particles, motion_),

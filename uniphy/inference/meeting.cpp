@@ -8,9 +8,6 @@
 namespace uniphy {
 namespace {
 
-/// Cells, beyond the stencil: between two frames bodies come nearer than they are at either.
-constexpr double kMargin = 0.5;
-
 /// The nodes that the particles of a frame reach.
 class Nodes {
  public:
@@ -19,24 +16,24 @@ class Nodes {
 
   void clear() { std::fill(reached_.begin(), reached_.end(), false); }
   void reach(const double* x) {
-    visit(x, kMargin, [&](std::size_t node) {
+    visit(x, [&](std::size_t node) {
       reached_[node] = true;
       return false;
     });
   }
   bool reached_by(const double* x) const {
-    return visit(x, 0, [&](std::size_t node) { return bool(reached_[node]); });
+    return visit(x, [&](std::size_t node) { return bool(reached_[node]); });
   }
 
  private:
   /// The quadratic B-spline of a particle at x reaches the nodes less than 1.5 cells away.
   template <class Node>
-  bool visit(const double* x, double margin, const Node& node) const {
+  bool visit(const double* x, const Node& node) const {
     std::array<int, 3> low{}, high{};
     for (int k = 0; k < 3; ++k) {
       const double cell = x[k] * n_;
-      low[k] = std::clamp(static_cast<int>(std::ceil(cell - 1.5 - margin)), 0, n_ - 1);
-      high[k] = std::clamp(static_cast<int>(std::floor(cell + 1.5 + margin)), 0, n_ - 1);
+      low[k] = std::clamp(static_cast<int>(std::ceil(cell - 1.5)), 0, n_ - 1);
+      high[k] = std::clamp(static_cast<int>(std::floor(cell + 1.5)), 0, n_ - 1);
     }
     for (int i = low[0]; i <= high[0]; ++i) {
       for (int j = low[1]; j <= high[1]; ++j) {

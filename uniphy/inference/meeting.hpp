@@ -14,8 +14,8 @@ struct BodyPath {
   std::vector<double> x;  ///< [frames, particles, 3] m
 };
 
-/// The first frame at which two bodies are so near that they share nodes of the grid, or would
-/// within half a cell more; −1: they never do.
+/// The first frame at which two bodies are so near that they share nodes of the grid; −1: they
+/// never do. What one does to the other may begin any time after the frame before.
 std::int64_t first_meeting(const BodyPath& a, const BodyPath& b, const kernels::GridSettings& grid);
 
 /// For each body the number of the group that it belongs to: bodies that meet, in any order, are in

@@ -95,7 +95,7 @@ void check_start(const Observation& o, const ObservedSteps& steps,
     return turning * static_cast<double>(steps.step[f]) * grid.dt;
   };
   const std::ptrdiff_t most = std::min<std::ptrdiff_t>(kStartFrames, o.frames - 1);
-  while (check.free_frames < most && o.time[check.free_frames + 1] - o.time[0] < o.meeting &&
+  while (check.free_frames < most && !meets_by(o, check.free_frames + 1) &&
          out_of_reach(o, grid, check.free_frames) && out_of_reach(o, grid, check.free_frames + 1) &&
          (check.free_frames == 0 || angle(check.free_frames + 1) < kSmallAngle)) {
     ++check.free_frames;
@@ -158,8 +158,8 @@ ObservationCheck check_observation(const Observation& observation, const Observe
   const RigidMotion motion = observed_motion(observation, steps, grid);
   check_start(observation, steps, grid, motion, check);
   // Another body may push it.
-  const bool alone = observation.meeting > observation.time.back() - observation.time.front();
-  if (is_complete(observation) && alone) check_energy(observation, grid, motion, check);
+  if (is_complete(observation) && !meets_by(observation, observation.frames - 1))
+    check_energy(observation, grid, motion, check);
   return check;
 }
 

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <memory>
 #include <numeric>
+#include <utility>
 
 #include "ops/kernels/base/error.hpp"
 #include "ops/kernels/laws/tracer.hpp"
@@ -212,10 +213,14 @@ Eigen::Isometry3d flight_pose(const ObservedSteps& steps, const kernels::GridSet
          Eigen::Translation3d(-motion.centre);
 }
 
+bool meets_by(const Observation& observation, std::ptrdiff_t frame) {
+  return observation.time[frame] - observation.time[0] > observation.meeting;
+}
+
 bool reaches_wall(const Observation& observation, const ObservedSteps& steps,
                   const kernels::GridSettings& grid, const RigidMotion& motion,
                   std::ptrdiff_t frame) {
-  if (observation.time[frame] - observation.time[0] >= observation.meeting) return true;
+  if (meets_by(observation, frame)) return true;
   const Eigen::Isometry3d pose = flight_pose(steps, grid, motion, frame);
   const double low = grid.bound + 0.5, high = grid.n - grid.bound - 0.5;  // in cells
   const std::vector<double> start = observation.start();
@@ -359,8 +364,14 @@ MotionEstimate estimate_motion(const Observation& observation, const ObservedSte
       if (frames > before) motion = observed_motion(observation, steps, grid, frames);
     }
   }
-  return {InitialState(motion),
-          spread_of(observation, Flight(observation, steps, grid, frames), frames, motion)};
+  std::vector<double> spread =
+      spread_of(observation, Flight(observation, steps, grid, frames), frames, motion);
+  if (meets_by(observation, frames)) {
+    // What the other one does to it may pass for a motion of its own: as much as it moves.
+    const double speed = motion.linear.norm(), size = observed_size(observation);
+    for (int k = 0; k < 6; ++k) spread[k] += k < 3 ? speed : speed / size;
+  }
+  return {InitialState(motion), std::move(spread)};
 }
 
 std::ptrdiff_t first_contact(const Observation& observation, const ObservedSteps& steps,

@@ -83,8 +83,11 @@ inline constexpr double kFlightAngle = 0.2;
 Eigen::Isometry3d flight_pose(const ObservedSteps& steps, const kernels::GridSettings& grid,
                               const RigidMotion& motion, std::ptrdiff_t frame);
 
-/// Whether the body, moving on as a rigid one, reads a node that a wall stops at the frame, or has
-/// met another body until then (Observation::meeting).
+/// Whether another body may have acted on this one until the frame (Observation::meeting).
+bool meets_by(const Observation& observation, std::ptrdiff_t frame);
+
+/// Whether the body, moving on as a rigid one, reads a node that a wall stops at the frame, or
+/// meets_by() it.
 bool reaches_wall(const Observation& observation, const ObservedSteps& steps,
                   const kernels::GridSettings& grid, const RigidMotion& motion,
                   std::ptrdiff_t frame);

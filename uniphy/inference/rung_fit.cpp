@@ -38,23 +38,34 @@ constexpr double kGainOverNoise = 1;
 LeastSquaresEnd least_squares(const FitProblem& problem, const Tensor& start, const Pull& pull,
                               std::ptrdiff_t frames, int iterations, const StartsAt& starts,
                               double least_gain, RungTask& task, const AfterStep& after_step) {
+  std::optional<StartCorrection> correction;
+  Renew renew;
+  if (starts) renew = [&](const Tensor& point) { correction = starts(point); };
+  return least_squares(
+      [&](const Tensor& u) {
+        return problem.residuals(u, frames, correction ? &*correction : nullptr);
+      },
+      renew, problem.seen(frames), start, pull, iterations, least_gain, task, after_step);
+}
+
+LeastSquaresEnd least_squares(const Residuals& residuals, const Renew& renew, double seen,
+                              const Tensor& start, const Pull& pull, int iterations,
+                              double least_gain, RungTask& task, const AfterStep& after_step) {
   const Tensor leaf = start.detach().clone();
   LevenbergMarquardt optimizer({leaf}, LevenbergMarquardtOptions());
   if (task.steps > 0) optimizer.resume(task.optimizer);
-  std::optional<StartCorrection> correction;
-  const auto residuals = [&](const Tensor& u) {
-    const Tensor r = problem.residuals(u, frames, correction ? &*correction : nullptr);
+  const auto pulled = [&](const Tensor& u) {
+    const Tensor r = residuals(u);
     return r.defined() ? torch::cat({r, pull.weight * (u - pull.to)}) : r;
   };
   Stopwatch watch(task);
-  const double little =
-      std::max(least_gain, starts ? kGainOverNoise / problem.seen(frames) : kLittleGain);
+  const double little = std::max(least_gain, renew ? kGainOverNoise / seen : kLittleGain);
   while (!task.done) {
-    if (starts) {
-      correction = starts(optimizer.point());
+    if (renew) {
+      renew(optimizer.point());
       optimizer.forget_residuals();
     }
-    const double loss = optimizer.step(residuals).item<double>();
+    const double loss = optimizer.step(pulled).item<double>();
     ++task.steps;
     const double gained = optimizer.gained();
     task.done =

@@ -42,6 +42,15 @@ LeastSquaresEnd least_squares(const FitProblem& problem, const torch::Tensor& st
                               const StartsAt& starts, double least_gain, RungTask& task,
                               const AfterStep& after_step);
 
+/// Is called with each iteration's point before residuals are asked for there.
+using Renew = std::function<void(const torch::Tensor& point)>;
+
+/// The same of any residuals of about so many coordinates `seen`; where `renew` is not empty they
+/// are others after it, and end as with starts.
+LeastSquaresEnd least_squares(const Residuals& residuals, const Renew& renew, double seen,
+                              const torch::Tensor& start, const Pull& pull, int iterations,
+                              double least_gain, RungTask& task, const AfterStep& after_step);
+
 /// The lowest point of a Descent over all frames from `start`. Goes on where the task was left.
 torch::Tensor descend(const FitProblem& problem, const torch::Tensor& start,
                       const DescentOptions& options, RungTask& task, const AfterStep& after_step);

@@ -102,7 +102,7 @@ LeastSquaresEnd RungFitter::least_squares(const Observation& seen, std::ptrdiff_
   Pull all{to, torch::full_like(to, pull)};
   if (with_motion) {
     all.to = torch::cat({to, problem.change_to(first_motion_.motion)});
-    const Tensor weight = motion_pull(problem, from, frames, velocity == FitVelocity::held);
+    const Tensor weight = pull_of_motion(problem, from, frames, velocity == FitVelocity::held);
     all.weight = torch::cat({all.weight, weight});
   }
   const int columns = static_cast<int>(from.numel());
@@ -163,21 +163,30 @@ FitPosterior RungFitter::posterior(const Observation& seen, Rung rung, const Ten
   return result;
 }
 
-Tensor RungFitter::motion_pull(const FitProblem& problem, const Tensor& point,
-                               std::ptrdiff_t frames, bool held) const {
-  const double noise = problem.noise_over_size();
+Tensor RungFitter::pull_of_motion(const FitProblem& problem, const Tensor& point,
+                                  std::ptrdiff_t frames, bool held) const {
   double beside = 0;
   if (held) {
     const std::optional<StartCorrection> starts = starts_at(problem, point, frames);
     const Tensor r = problem.residuals(point, frames, starts ? &*starts : nullptr);
-    const double misfit = r.defined() ? r.square().sum().item<double>() : 0;
-    const double allowed = (starts ? kNoiseAllowance : 2) * noise;
-    beside = std::max(0.0, misfit - allowed * allowed);
+    beside = misfit_beside_noise(problem, r.defined() ? r.square().sum().item<double>() : 0,
+                                 starts.has_value());
   }
+  return motion_pull(problem, first_motion_, frames, beside);
+}
+
+double misfit_beside_noise(const FitProblem& problem, double loss, bool starts) {
+  const double allowed = (starts ? kNoiseAllowance : 2) * problem.noise_over_size();
+  return std::max(0.0, loss - allowed * allowed);
+}
+
+Tensor motion_pull(const FitProblem& problem, const MotionEstimate& first, std::ptrdiff_t frames,
+                   double beside) {
+  const double noise = problem.noise_over_size();
   if (problem.motion_size() > initial_numbers(0))
     beside = std::max(beside, kPolynomialError * kPolynomialError);
   const double error = std::sqrt(noise * noise / problem.seen(frames) + beside);
-  const Tensor spread = torch::tensor(first_motion_.spread, torch::kFloat64);
+  const Tensor spread = torch::tensor(first.spread, torch::kFloat64);
   return (error * problem.motion_units() / spread).clamp_max(kMostPull);
 }
 

@@ -20,6 +20,16 @@ namespace uniphy {
 /// is off.
 enum class FitVelocity { no, yes, held };
 
+/// How strongly least squares over the first `frames` pull the initial state to the one of the
+/// first frames, [FitProblem::motion_size()]: what that is known to against what a roll-out misses.
+/// Noise is independent from point to point; `beside` (over size, squared) is what the law, the
+/// grid or the time step leave beside it, one error that all share, so that such a misfit does not
+/// move a velocity that is held.
+torch::Tensor motion_pull(const FitProblem& problem, const MotionEstimate& first,
+                          std::ptrdiff_t frames, double beside);
+/// Of a loss, what noise does not account for; `starts`: those of the points are eliminated.
+double misfit_beside_noise(const FitProblem& problem, double loss, bool starts);
+
 /// The work of a ladder: fits points of its rungs to an observation or its first part, shows the
 /// progress, keeps the state on disk and counts what each rung cost.
 class RungFitter {
@@ -66,12 +76,9 @@ class RungFitter {
  private:
   FitOptions rung_options(bool differences) const;
   const FitVariables& of(Rung rung) const;
-  /// How strongly the initial velocity is pulled to the one of the first frames,
-  /// [FitProblem::motion_size()]: what that is known to against what a roll-out misses. Noise is
-  /// independent from point to point; what the law, the grid or the time step leave beside it is
-  /// one error that all share, so that such a misfit does not move a velocity that is held.
-  torch::Tensor motion_pull(const FitProblem& problem, const torch::Tensor& point,
-                            std::ptrdiff_t frames, bool held) const;
+  /// motion_pull of a problem at a point.
+  torch::Tensor pull_of_motion(const FitProblem& problem, const torch::Tensor& point,
+                               std::ptrdiff_t frames, bool held) const;
   /// Where the points start, by the flow at a point; nothing where that is known or the roll-out
   /// fails.
   std::optional<StartCorrection> starts_at(const FitProblem& problem, const torch::Tensor& point,

@@ -8,11 +8,12 @@
 #include <limits>
 #include <map>
 #include <numeric>
-#include <set>
 
+#include "ops/base/torch.hpp"
 #include "ops/kernels/base/error.hpp"
 #include "uniphy/data/random_law.hpp"
 #include "uniphy/inference/adaptation_state.hpp"
+#include "uniphy/inference/joint_fit.hpp"
 #include "uniphy/inference/meeting.hpp"
 #include "uniphy/inference/motion_objective.hpp"
 #include "uniphy/inference/observed_motion.hpp"
@@ -27,9 +28,10 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr std::size_t kMostCombinations = 125;
 /// Share of the time after all have met that combinations are compared over.
 constexpr double kTrialHorizon = 0.5;
-/// Rounds of z, and the share of the error that another has to take away.
-constexpr int kMostRounds = 4;
-constexpr double kRoundShare = 0.2;
+/// Fits of each body by itself, before all are fitted at once: in the first one the others still
+/// have the laws of a whole family. Iterations of the last least squares of each.
+constexpr int kRounds = 2;
+constexpr int kRoundIterations = 4;
 
 /// Of every material the start that is nearest to the mean of its starts.
 std::vector<int> middle_starts(const FitVariables& variables) {
@@ -61,14 +63,22 @@ std::vector<int> middle_starts(const FitVariables& variables) {
 
 /// A body as it is known between two fits.
 struct Body {
-  std::string name;          ///< for messages and files
-  Observation observation;   ///< with known starts
-  std::vector<double> u;     ///< empty: not fitted yet
-  Companion self;            ///< as the others' roll-outs have it
-  double error = kInfinity;  ///< mse over size², of its last fit
+  std::string name;         ///< for messages and files
+  Observation observation;  ///< with known starts
+  std::vector<double> u;    ///< empty: not fitted yet
+  Companion self;           ///< as the others' roll-outs have it
   std::ptrdiff_t contact = 0;
   Adaptation fitted;
+  bool explained = false;  ///< by the joint fit
   int rounds = 0;
+
+  /// The others' roll-outs have it as it is fitted now.
+  void take_over() {
+    u = fitted.fit.u;
+    self.law = fitted.fit.law;
+    self.motion = fitted.fit.motion;
+    self.x = fitted.seen.start();
+  }
 };
 
 class BodiesFit {
@@ -100,7 +110,8 @@ class BodiesFit {
     for (std::size_t b = 0; b < bodies_.size(); ++b) groups[group_[b]].push_back(b);
     for (const auto& [number, members] : groups) {
       if (members.size() > 1) fit_together(members);
-      last_fits(members);
+      // No wall or other body, or more freedom than z is asked for and there is need of it.
+      if (members.size() == 1 || !joint_does(members)) last_fits(members);
     }
     return finish();
   }
@@ -149,7 +160,8 @@ class BodiesFit {
         if (frame < 0) continue;
         meets[a][b] = meets[b][a] = true;
         const std::vector<double>& time = bodies_[a].observation.time;
-        for (const std::size_t k : {a, b}) meeting[k] = std::min(meeting[k], time[frame] - time[0]);
+        for (const std::size_t k : {a, b})
+          meeting[k] = std::min(meeting[k], time[std::max<std::int64_t>(frame - 1, 0)] - time[0]);
       }
     }
     group_ = meeting_groups(meets);
@@ -243,17 +255,63 @@ class BodiesFit {
 
   void fit_together(const Members& members) {
     choose_laws(members);
-    double before = kInfinity;
-    for (int round = 1; round <= kMostRounds; ++round) {
-      AdaptationOptions latent = adaptation_;
-      latent.rungs = {Rung::latent};
-      latent.samples = 0;
+    AdaptationOptions latent = adaptation_;
+    latent.rungs = {Rung::latent};
+    latent.iterations = std::min(kRoundIterations, latent.iterations);
+    latent.samples = 0;
+    for (int round = 0; round < kRounds; ++round) {
       for (const std::size_t b : in_order_of_contact(members)) fit(b, latent);
-      double error = 0;
-      for (const std::size_t b : members) error += bodies_[b].error / double(members.size());
-      if (!(error < (1 - kRoundShare) * before)) break;
-      before = error;
     }
+    fit_jointly(members);
+  }
+
+  bool joint_does(const Members& members) const {
+    const bool climbs = adaptation_.rungs.size() > 1 && can_be_adapted(variables_);
+    return std::all_of(members.begin(), members.end(),
+                       [&](std::size_t b) { return bodies_[b].explained || !climbs; });
+  }
+
+  /// Where that explains all motions or nothing else is to be tried, with the posterior.
+  void fit_jointly(const Members& members) {
+    std::vector<JointBody> bodies;
+    for (const std::size_t k : members) {
+      const Body& b = bodies_[k];
+      JointBody& j = bodies.emplace_back();
+      j.name = message_name(b);
+      j.seen = b.fitted.seen;
+      j.u = torch::tensor(b.u, torch::kFloat64);
+      j.motion = b.self.motion;
+    }
+    FitHooks hooks = hooks_;
+    if (!hooks.state_file.empty())
+      hooks.state_file.replace_extension(fmt::format(".group{}.h5", group_[members.front()]));
+    hooks.fingerprint = fmt::format("{} group {}", hooks_.fingerprint, group_[members.front()]);
+    JointFit joint(std::move(bodies), variables_, options_, adaptation_, hooks);
+    if (!joint.state_file().empty()) state_files_.push_back(joint.state_file());
+    joint.run();
+    for (std::size_t i = 0; i < members.size(); ++i)
+      bodies_[members[i]].explained = joint.bodies()[i].explained();
+    if (joint_does(members)) joint.add_posterior();
+    for (std::size_t i = 0; i < members.size(); ++i)
+      take(joint.bodies()[i], joint.roll_outs(), bodies_[members[i]]);
+  }
+
+  /// What the joint fit came to.
+  void take(const JointBody& found, int roll_outs, Body& b) const {
+    Adaptation& a = b.fitted;
+    a.seen = found.seen;
+    a.roll_outs += roll_outs;
+    const double size = observed_size(found.seen);
+    FitResult& fit = a.fit;
+    fit.u.assign(found.u.data_ptr<double>(), found.u.data_ptr<double>() + found.u.numel());
+    fit.law = variables_.law(fit.u);
+    fit.motion = found.motion;
+    fit.mse = found.loss * size * size;
+    a.posterior = found.posterior;
+    a.samples.clear();
+    for (const torch::Tensor& sample : found.posterior.samples)
+      a.samples.push_back(variables_.law(sample.slice(0, 0, variables_.size()).contiguous()));
+    b.take_over();
   }
 
   void last_fits(const Members& members) {
@@ -278,13 +336,7 @@ class BodiesFit {
     const auto started = b.u.empty() ? nullptr : with_start(variables_, b.u);
     b.fitted = adapt(b.observation, message_name(b), started ? *started : variables_, options,
                      adaptation, hooks);
-    const FitResult& fit = b.fitted.fit;
-    const double size = observed_size(b.observation);
-    b.u = fit.u;
-    b.error = fit.mse / (size * size);
-    b.self.law = fit.law;
-    b.self.motion = fit.motion;
-    b.self.x = b.fitted.seen.start();
+    b.take_over();
   }
 
   BodiesInference finish() {

@@ -70,8 +70,8 @@ struct Observation {
   std::string cloud_distance = "transport";
   std::vector<double> vertices;  ///< [vertices, 3] m, the surface of a body without particles
   std::vector<std::int64_t> triangles;  ///< [triangles, 3]
-  /// Seconds from the first frame to when the body meets another one, if it ever does. Found by the
-  /// fit, not in the file.
+  /// Seconds from the first frame after which another body acts on this one, if one ever does.
+  /// Found by the fit, not in the file.
   double meeting = std::numeric_limits<double>::infinity();
 
   int grid = 20;

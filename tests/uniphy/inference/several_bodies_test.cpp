@@ -12,6 +12,7 @@
 #include "tests/uniphy/inference/observed_scene.hpp"
 #include "tests/uniphy/support/scratch.hpp"
 #include "uniphy/data/laboratory_view.hpp"
+#include "uniphy/inference/joint_fit.hpp"
 #include "uniphy/inference/meeting.hpp"
 #include "uniphy/inference/motion_objective.hpp"
 
@@ -168,9 +169,9 @@ TEST(Meeting, IsTheFirstFrameWithNodesInCommon) {
   BodyPath a{3, {}}, b{3, {}};
   for (int f = 0; f < 3; ++f) {
     a.x.insert(a.x.end(), {0.3, 0.5, 0.5});
-    b.x.insert(b.x.end(), {0.6 - 0.07 * f, 0.5, 0.5});
+    b.x.insert(b.x.end(), {0.6 - 0.09 * f, 0.5, 0.5});
   }
-  // Stencils reach 1.5 cells of 0.05 m each way, and half a cell is added: 0.175 m.
+  // Stencils reach 1.5 cells of 0.05 m each way.
   EXPECT_EQ(first_meeting(a, b, grid), 2);
   b.x[6] = std::nan("");  // not seen there
   EXPECT_EQ(first_meeting(a, b, grid), -1);
@@ -266,6 +267,26 @@ TEST(SeveralBodies, ResumesToTheSameBitsOnAnyNumberOfThreads) {
     EXPECT_EQ(resumed.bodies[b].fitted.x, whole.bodies[b].fitted.x);
   }
   EXPECT_FALSE(resumed.state_files.empty());
+}
+
+TEST(SeveralBodies, TheMarginalOfAPosteriorIsThatOfItsBlock) {
+  // Two codes of two numbers and a velocity of one number each: u₁ and u₃ go together.
+  FitPosterior all;
+  const double c = std::sqrt(0.5);
+  all.spread = {0.1, 0.2, 0.3, 0.9};
+  all.directions = Eigen::MatrixXd::Zero(4, 4);
+  all.directions(0, 0) = all.directions(2, 0) = c;  // 0.1 along (1, 0, 1, 0)/√2
+  all.directions(1, 1) = 1;
+  all.directions(3, 2) = 1;
+  all.directions(0, 3) = c;
+  all.directions(2, 3) = -c;
+  all.samples = {torch::arange(6, torch::kFloat64)};
+  const FitPosterior second = marginal_of(all, 2, 2, 5, 1);
+  ASSERT_EQ(second.spread.size(), 2u);
+  EXPECT_NEAR(second.spread[0], 0.3, 1e-12);
+  EXPECT_NEAR(second.spread[1], std::sqrt(0.5 * (0.01 + 0.81)), 1e-12);
+  EXPECT_EQ(second.determined, 1);
+  EXPECT_TRUE(torch::equal(second.samples[0], torch::tensor({2.0, 3.0, 5.0}, torch::kFloat64)));
 }
 
 }  // namespace
