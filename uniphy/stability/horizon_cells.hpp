@@ -1,0 +1,22 @@
+#pragma once
+
+#include "uniphy/stability/planned_cell.hpp"
+#include "uniphy/stability/stability_options.hpp"
+#include "uniphy/stability/subjects.hpp"
+
+namespace uniphy::stability {
+
+/// Row `horizons`: a cube of 6³ particles on the floor, elastic, plasticine and sand, in float64
+/// and float32. L = Σ w·x of the last state over P, w uniform in [−1, 1]; dL/d(log of the first
+/// parameter), of the isotropic law dL/dz₀, by the adjoint of the roll-out, against central
+/// quotients in float64 with steps of 1e-4 and 1e-5 of it.
+/// adjoint_growth = ‖dL/dx₀‖/‖dL/dx_N‖. Where the quotients disagree by more than kChaos, the
+/// motion is chaotic: no derivative is of use there, whoever computes it. Such a cell holds where
+/// its numbers are finite, and has chaos = 1.
+Plan horizon_cells(const StabilityOptions& options, const Subjects& subjects);
+
+inline constexpr double kChaos = 1e-2;
+/// Relative; larger errors turn a fit. Measured: 1e-9 … 4e-5 and 2e-6 … 7e-2 at 2000 steps.
+inline constexpr double kLongTolerance64 = 1e-3, kLongTolerance32 = 0.1;
+
+}  // namespace uniphy::stability
