@@ -48,10 +48,11 @@ bool plot_map(const std::filesystem::path& png, const ValueMap& map) {
             height = top + kCellHeight * static_cast<int>(rows) + bottom;
 
   std::string script = fmt::format(
-      "set title {} noenhanced\nunset key\nunset border\nset lmargin at screen {}\n"
+      "set label {} at screen 0.5,screen {} center noenhanced\nunset key\nunset border\nset "
+      "lmargin at screen {}\n"
       "set rmargin at screen {}\nset tmargin at screen {}\nset bmargin at screen {}\n"
       "set xrange [0:{}]\nset yrange [{}:0]\nunset ytics\nunset xtics\n",
-      gnuplot_text(map.title), double(left) / width, 1 - double(right) / width,
+      gnuplot_text(map.title), 1 - 22.0 / height, double(left) / width, 1 - double(right) / width,
       1 - double(top) / height, double(bottom) / height, columns, rows);
   for (std::size_t c = 0; c < columns; ++c) {
     script += fmt::format("set label {} at {},-0.4 center noenhanced\n",

@@ -3,6 +3,9 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <cmath>
+#include <tuple>
+#include <utility>
+#include <vector>
 
 #include "uniphy/geometry/random.hpp"
 
@@ -23,12 +26,27 @@ Matrix hencky_strain(const Matrix& F) {
   return solver.eigenvectors() * values.asDiagonal() * solver.eigenvectors().transpose();
 }
 
-/// Flows of less than rounding of the strain count as none.
-double cosine(const Matrix& force, const Matrix& flow) {
-  const double size = force.norm() * flow.norm();
-  if (!std::isfinite(size)) return std::nan("");
-  return flow.norm() > 1e-9 && force.norm() > 1e-9 ? (force.cwiseProduct(flow)).sum() / size : 1;
-}
+/// Works with the sizes of what does them.
+struct Works {
+  std::vector<double> work;
+  double forces = 0, flows = 0;  ///< sums of squares
+
+  void add(const Matrix& force, const Matrix& flow, const Matrix& whole_force,
+           const Matrix& whole_flow) {
+    work.push_back(force.cwiseProduct(flow).sum());
+    forces += whole_force.squaredNorm();
+    flows += whole_flow.squaredNorm();
+  }
+  /// The least in units of the sizes, and which; NaN where one is not finite.
+  std::pair<double, std::int64_t> least() const {
+    const double unit = std::sqrt(forces * flows) / static_cast<double>(work.size());
+    std::size_t at = 0;
+    for (std::size_t i = 0; i < work.size(); ++i) {
+      if (!(work[i] >= work[at])) at = i;
+    }
+    return {work[at] / unit, static_cast<std::int64_t>(at)};
+  }
+};
 
 }  // namespace
 
@@ -37,7 +55,7 @@ Dissipation least_dissipation(const kernels::LawDescription& description, std::i
   const auto law = kernels::make_law<double>(description);
   const double dt = 2e-4;
   UniformRandom random(seed);
-  Dissipation least{1, 1, 0, 0};
+  Works plastic, viscous;
   for (std::int64_t i = 0; i < count; ++i) {
     const Matrix U = random_rotation(random), V = random_rotation(random);
     const Eigen::Vector3d strain =
@@ -53,17 +71,13 @@ Dissipation least_dissipation(const kernels::LawDescription& description, std::i
     };
     evaluate(rest, projected, tau);
     evaluate(C, ignored, moving);
-    const double plastic = cosine(tau, hencky_strain(F) - hencky_strain(projected));
-    const double viscous = cosine(moving - tau, 0.5 * (C + C.transpose()));
-    if (!(plastic >= least.plastic)) {
-      least.plastic = plastic;
-      least.plastic_state = i;
-    }
-    if (!(viscous >= least.viscous)) {
-      least.viscous = viscous;
-      least.viscous_state = i;
-    }
+    const Matrix strain_tensor = hencky_strain(F), rate = 0.5 * (C + C.transpose());
+    plastic.add(tau, strain_tensor - hencky_strain(projected), tau, strain_tensor);
+    viscous.add(moving - tau, rate, moving, rate);
   }
+  Dissipation least;
+  std::tie(least.plastic, least.plastic_state) = plastic.least();
+  std::tie(least.viscous, least.viscous_state) = viscous.least();
   return least;
 }
 

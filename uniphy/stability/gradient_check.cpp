@@ -55,7 +55,7 @@ std::pair<Tensor, Tensor> differences(const StateFunction& f, const Tensor& F, c
 
 struct Tally {
   std::int64_t states = 0, finite = 0, judged = 0, with_derivative = 0, left_out = 0, zeroed = 0;
-  double largest = 0;
+  double largest = 0, squared_error = 0, squared_size = 0;
   std::vector<double> errors;
   Failure failure;
   double failed_error = 0;
@@ -68,11 +68,13 @@ struct Tally {
 void judge(const Tensor& g, const Tensor& reference, const Tensor& agrees, const Tensor& jumps,
            Tally& t) {
   const Tensor finite = torch::isfinite(g).flatten(1).all(1);
-  const Tensor error = norms(g - reference) / norms(reference).clamp_min(kLeastNorm);
+  const Tensor miss = norms(g - reference), expected = norms(reference);
+  const Tensor error = miss / expected.clamp_min(kLeastNorm);
   const Tensor size = g.abs().flatten(1).amax(1);
   const auto is_finite = finite.accessor<bool, 1>(), agree = agrees.accessor<bool, 1>(),
              jump = jumps.accessor<bool, 1>();
-  const auto e = error.accessor<double, 1>(), s = size.accessor<double, 1>();
+  const auto e = error.accessor<double, 1>(), s = size.accessor<double, 1>(),
+             m = miss.accessor<double, 1>(), x = expected.accessor<double, 1>();
   for (std::int64_t p = 0; p < g.size(0); ++p) {
     const std::int64_t row = t.states++;
     if (is_finite[p]) {
@@ -92,6 +94,8 @@ void judge(const Tensor& g, const Tensor& reference, const Tensor& agrees, const
     ++t.with_derivative;
     if (!is_finite[p]) continue;
     t.errors.push_back(e[p]);
+    t.squared_error += m[p] * m[p];
+    t.squared_size += x[p] * x[p];
     if (!(e[p] <= kGradientTolerance))
       t.fail(row, fmt::format("its gradient is wrong by {:.2g} of its size", e[p]));
   }
@@ -139,6 +143,8 @@ void check_gradients(const std::vector<double>& all, const GradientCheck& check,
   cell.deciding = "gradient_error";
   cell.set("gradient_error", t.judged > 0 && t.errors.empty() ? std::nan("") : worst);
   cell.set("gradient_error_median", kernels::median(t.errors));
+  cell.set("gradient_error_together",
+           t.squared_size > 0 ? std::sqrt(t.squared_error / t.squared_size) : std::nan(""));
   cell.set("finite_share", finite);
   cell.set("derivative_share", there);
   cell.set("left_out_share", share(t.left_out, t.states));

@@ -33,8 +33,9 @@ struct GradientCheck {
 /// since isotropic functions bend on the scale of σ2 + σ3, the denominator of their rotation part.
 /// A state has a derivative where both agree to 1e-6 of its norm (at least 1e-3). States with
 /// |σ2 + σ3| ≤ 1e-5 (kLeastSum), whose rotation jumps, are judged by finiteness alone.
-/// Sets gradient_error (largest), gradient_error_median, finite_share, derivative_share,
-/// left_out_share, gradient_max, states, zeroed (entries), verdict and failure (particle: the row).
+/// Sets gradient_error (largest), gradient_error_median, gradient_error_together (‖g −
+/// g_ref‖/‖g_ref‖ of all states as one vector), finite_share, derivative_share, left_out_share,
+/// gradient_max, states, zeroed (entries), verdict and failure (particle: the row).
 void check_gradients(const std::vector<double>& F, const GradientCheck& check, Cell& cell);
 
 /// dL/dF of R = U Vᵀ from G = dL/dR, without singular vectors: with the stretch S = Rᵀ F and

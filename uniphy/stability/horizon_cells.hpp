@@ -12,7 +12,10 @@ namespace uniphy::stability {
 /// quotients in float64 with steps of 1e-4 and 1e-5 of it.
 /// adjoint_growth = ‖dL/dx₀‖/‖dL/dx_N‖. Where the quotients disagree by more than kChaos, the
 /// motion is chaotic: no derivative is of use there, whoever computes it. Such a cell holds where
-/// its numbers are finite, and has chaos = 1.
+/// its numbers are finite, and has chaos = 1. Where they agree with each other and not with the
+/// adjoint, and a third one with a step of 1e-8 does agree with it, the motion has a kink next to
+/// the parameter, as where undeformed particles stand at the tip of a yield surface: the adjoint is
+/// the derivative, though of little use to a longer step. Such a cell holds, and has kink = 1.
 Plan horizon_cells(const StabilityOptions& options, const Subjects& subjects);
 
 inline constexpr double kChaos = 1e-2;

@@ -11,9 +11,10 @@ struct Method {
   bool reference;  ///< known to fail somewhere; shown beside ours
 };
 
-inline constexpr std::array<Method, 8> kMethods{
+inline constexpr std::array<Method, 9> kMethods{
     {{"analytic", "the analytic laws of the five families, through the kernels and ops", false},
      {"isotropic", "the trained isotropic law with its codes of the five families", false},
+     {"exported", "the same law and codes as its TorchScript file, law.pt, in float64", false},
      {"published", "the published form (raw F, U, S, V into a network), randomly initialised: weak",
       false},
      {"raw_svd", "the same analytic laws through U and V of torch::linalg_svd and its derivative",

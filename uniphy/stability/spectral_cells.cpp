@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <memory>
 
+#include "models/torchscript.hpp"
 #include "ops/base/torch.hpp"
 #include "ops/laws/kirchhoff_stress.hpp"
 #include "ops/laws/return_mapping.hpp"
@@ -58,6 +59,17 @@ StateFunction learned_function(const kernels::LawDescription& law, double modulu
   };
 }
 
+StateFunction exported_function(const kernels::LawDescription& law, double modulus) {
+  const auto script = std::make_shared<models::ScriptLaw>(
+      models::ScriptLaw{models::script_law(*law.weights, torch::kFloat64), law.weights->form,
+                        law.weights->latent_size, torch::kFloat64});
+  const Tensor z = torch::tensor(law.z, torch::kFloat64);
+  return [script, z, modulus](const Tensor& F) {
+    const Tensor F_proj = script->project(F, z, kDt);
+    return side_by_side(F_proj, script->stress(F_proj, torch::zeros_like(F.detach()), z), modulus);
+  };
+}
+
 bool through_svd(const std::string& method) {
   return method == "raw_svd" || method == "clamped_svd" || method == "nan_to_zero";
 }
@@ -86,7 +98,8 @@ void add_law(Plan& plan, const StabilityOptions& o, const Subjects& all, const S
     const kernels::LawDescription& law = subject.law(method);
     if (law.id == LawId::learned) {
       const double modulus = subject.analytic.lambda + 2 * subject.analytic.mu;
-      check.function = check.reference = learned_function(law, modulus);
+      check.reference = learned_function(law, modulus);
+      check.function = method == "exported" ? exported_function(law, modulus) : check.reference;
       if (method == "published") F.resize(std::min<std::size_t>(F.size(), 9 * kPublishedStates));
     } else {
       check.reference = kernel_function(law);
@@ -147,7 +160,9 @@ Plan spectral_cells(const StabilityOptions& o, const Subjects& subjects) {
       for (const char* method : {"analytic", "raw_svd", "clamped_svd", "nan_to_zero"}) {
         if (plastic && o.has_method(method)) add_law(plan, o, subjects, set, method, subject);
       }
-      if (o.has_method("isotropic")) add_law(plan, o, subjects, set, "isotropic", subject);
+      for (const char* method : {"isotropic", "exported"}) {
+        if (o.has_method(method)) add_law(plan, o, subjects, set, method, subject);
+      }
       if (o.has_method("published") && id == LawId::plasticine)
         add_law(plan, o, subjects, set, "published", subject);
       if (id != LawId::sand || (set->stressor != "rotation" && set->stressor != "near_rotation"))

@@ -23,7 +23,7 @@ inline constexpr double kOffTheTip = 0.97;
 ///   equal_values       Σ = (a, a, b) and (a, b, b), a in [1.1, 1.4], b in [0.6, 0.9]
 ///   near_equal_values  the same, the two apart by 1e-14 … 1e-2 (log-uniform)
 ///   at_rest            F = I
-///   rotation           rotations rounded to float32, so that F^T F = I to 1e-7
+///   rotation           rotations by three angles in float32 arithmetic: FᵀF = I to 1e-7
 ///   near_rotation      Q (I + 1e-6 E), E with entries in [−1, 1]
 ///   rank_loss          (a, b, 0), one of four (a, 0, 0), and F = 0
 ///   inverted           (a, b, −c), c in [0.1, 0.5]: det F < 0

@@ -15,7 +15,7 @@ constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 /// One row and column.
 struct Group {
-  std::int64_t all = 0, holds = 0, stops = 0, chaos = 0;
+  std::int64_t all = 0, holds = 0, stops = 0, chaos = 0, kinks = 0;
   double worst = kNone;     ///< of the deciding number
   double finite = 1;        ///< the least share of finite gradients
   double derivative = 1;    ///< the least share of states with a derivative
@@ -39,6 +39,7 @@ Group group_of(const std::vector<Cell>& cells, const std::string& stressor,
     g.holds += c.verdict == Verdict::holds ? 1 : 0;
     g.stops += c.verdict == Verdict::stops ? 1 : 0;
     g.chaos += c.find("chaos").value_or(0) != 0 ? 1 : 0;
+    g.kinks += c.find("kink").value_or(0) != 0 ? 1 : 0;
     g.deciding = c.deciding;
     g.finite = std::min(g.finite, c.find("finite_share").value_or(1));
     g.derivative = std::min(g.derivative, c.find("derivative_share").value_or(1));
@@ -87,6 +88,7 @@ std::string entry(const Group& g) {
   text += "; " + number_of(g);
   if (g.holds + g.stops < g.all && g.stops > 0) text += fmt::format("; {} stop", g.stops);
   if (g.chaos > 0) text += fmt::format("; {} chaotic", g.chaos);
+  if (g.kinks > 0) text += fmt::format("; {} at a kink", g.kinks);
   return text + " |";
 }
 
@@ -94,15 +96,17 @@ std::string rotation_table(const std::vector<Cell>& cells) {
   std::string text;
   for (const Cell& c : cells) {
     if (c.setting != "U V^T") continue;
-    text += fmt::format("| {} | {} | {:.2g} | {:.2g} | {:.2g} | {:.2g} |\n", c.stressor, c.method,
-                        c.find("finite_share").value_or(kNone),
+    text += fmt::format("| {} | {} | {:.2g} | {:.2g} | {:.2g} | {:.2g} | {:.2g} |\n", c.stressor,
+                        c.method, c.find("finite_share").value_or(kNone),
+                        c.find("gradient_error_together").value_or(kNone),
                         c.find("gradient_error_median").value_or(kNone), c.decided(),
                         c.find("factor_gradient").value_or(kNone));
   }
   if (text.empty()) return text;
   return "\nGradient through U Vᵀ, and through U and V themselves:\n\n| F | method | finite | "
-         "median "
-         "error | largest error | largest entry by U, V |\n|---|---|---|---|---|---|\n" +
+         "error "
+         "of all together | median | largest | largest entry by U, V "
+         "|\n|---|---|---|---|---|---|---|\n" +
          text;
 }
 
@@ -117,7 +121,8 @@ std::string quoted(const std::string& text) {
 }
 
 bool by_default(const Cell& c) {
-  return (c.method == "analytic" || c.method == "isotropic") && c.stressor != "time_step_beyond";
+  return (c.method == "analytic" || c.method == "isotropic" || c.method == "exported") &&
+         c.stressor != "time_step_beyond";
 }
 
 template <class Keep>

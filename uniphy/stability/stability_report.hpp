@@ -23,7 +23,7 @@ ValueMap survival_map(const std::vector<Cell>& cells);
 /// survives.STRESSOR.METHOD and gradient_error.STRESSOR.METHOD (the largest); of every method
 /// cells.METHOD, cells_survived.METHOD, gradient_finite_share.METHOD, gradient_error_max.METHOD;
 /// cells_default, cells_default_survived, gradient_finite_share, gradient_error_max of what is
-/// ours and has the defaults: analytic and isotropic in every row but time_step_beyond.
+/// ours and has the defaults: analytic, isotropic and exported in every row but time_step_beyond.
 void add_stability_metrics(const std::vector<Cell>& cells, Metrics& metrics);
 
 }  // namespace uniphy::stability

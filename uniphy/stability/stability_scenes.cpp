@@ -65,8 +65,8 @@ SceneDescription thrown_into_corner(const kernels::LawDescription& law, double s
 SceneDescription two_cubes(const kernels::LawDescription& law, double speed, std::int64_t per_side,
                            std::int64_t steps) {
   SceneDescription scene = without_gravity(steps);
-  // Two and a half cells of gap: beyond the reach of each other's stencils (kSharedCells).
-  const double away = 0.1 + 0.5 * 2.5 * kCell;
+  // A cell of gap.
+  const double away = 0.1 + 0.5 * kCell;
   for (const double side : {-1.0, 1.0}) {
     BodyDescription body = cube(law, 0.2, per_side);
     body.name = side < 0 ? "left" : "right";
