@@ -44,7 +44,7 @@ TEST(UncheckedStep, GoesOnWithNumbersThatAreNotFiniteWhereTheEngineStops) {
   Cell unchecked, checked;
   run_unchecked(scene, 0, unchecked);
   EXPECT_EQ(unchecked.verdict, Verdict::fails);
-  EXPECT_THAT(unchecked.failure.cause, HasSubstr("in silence"));
+  EXPECT_THAT(unchecked.failure.cause, HasSubstr("not finite"));
 
   const PlacedScene placed = place_scene(scene);
   UncheckedRollout rollout(scene, placed, 0);
