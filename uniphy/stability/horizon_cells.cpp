@@ -15,7 +15,8 @@
 namespace uniphy::stability {
 namespace {
 
-constexpr std::int64_t kPerSide = 6;
+constexpr double kSide = 0.3;         ///< m, of the cube
+constexpr std::int64_t kPerSide = 6;  ///< its particles, one a cell
 /// A step inside of the kinks that were met (1e-7 of z), and what rounding leaves of its quotient.
 constexpr double kClosest = 1e-8, kClosestNoise = 1e-2;
 
@@ -128,7 +129,7 @@ Plan horizon_cells(const StabilityOptions& o, const Subjects& all) {
     for (const char* method : {"analytic", "isotropic"}) {
       if (!o.has_method(method)) continue;
       for (const std::int64_t steps : o.horizons) {
-        SceneDescription scene = cube_on_floor(subject.law(method), kPerSide, steps);
+        SceneDescription scene = cube_on_floor(subject.law(method), 10, steps, kSide);
         scene.dt = place_scene(scene).grid.dt;  // the same for every parameter
         for (const bool single : {false, true}) {
           PlannedCell cell{"horizons",

@@ -36,8 +36,8 @@ StabilityOptions read_stability_options(Section& config) {
                                        "largest condition number of a random F");
   Section rollout = config.section("rollout", "time steps, impacts and latents");
   o.steps = rollout.integer("steps", o.quick ? 300 : 2000, between(1, 1e7), "", "of each");
-  o.per_side = rollout.integer("per_side", o.quick ? 6 : 10, between(2, 200), "",
-                               "particles along the side of a body");
+  o.per_side = rollout.integer("per_side", 10, between(2, 200), "",
+                               "particles along half a metre of a body; 10 are one a cell");
   o.drawn = rollout.integer("drawn", o.quick ? 2 : 10, between(1, 1000), "",
                             "random codes and perturbed networks, of every kind and family");
   Section horizons = config.section("horizons", "gradients of long roll-outs");

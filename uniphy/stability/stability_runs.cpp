@@ -1,9 +1,12 @@
 #include "uniphy/stability/stability_runs.hpp"
 
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "ops/kernels/base/error.hpp"
 #include "ops/kernels/rollout/lost_particle.hpp"
+#include "uniphy/scene/scene_warnings.hpp"
 #include "uniphy/stability/run_watch.hpp"
 #include "uniphy/stability/unchecked_step.hpp"
 
@@ -13,6 +16,15 @@ namespace {
 void stop(Cell& cell, const Failure& failure) {
   cell.verdict = Verdict::stops;
   cell.failure = failure;
+}
+
+/// What the user was told before the run, for a failure that came without an error.
+void add_warnings(const SceneDescription& scene, const PlacedScene& placed, Cell& cell) {
+  const std::vector<std::string> warnings = scene_warnings(scene, placed);
+  cell.set("warnings", static_cast<double>(warnings.size()));
+  if (cell.verdict != Verdict::fails) return;
+  for (const std::string& warning : warnings)
+    cell.failure.cause += "; warned of before the run: " + warning;
 }
 
 /// What the watch saw wins over the error that ended the run later.
@@ -56,6 +68,7 @@ void run_checked(SceneDescription scene, Cell& cell, ParticleState* last) {
     stop_unless_violated(watch, cell, {reached, -1, error.what()});
   }
   cell.set("steps", static_cast<double>(reached));
+  add_warnings(scene, placed, cell);
 }
 
 void run_unchecked(const SceneDescription& scene, double mass_epsilon, Cell& cell,

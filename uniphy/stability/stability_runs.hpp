@@ -13,7 +13,8 @@ inline constexpr double kMassEpsilon = 1e-7;
 
 /// Rolls the scene out with the engine and judges it by RunWatch. An Error of the engine or of the
 /// placement ends the cell as `stops`, with the particle and the step that LostParticle carries.
-/// Sets the numbers of RunWatch, dt (s) and steps (done).
+/// Sets the numbers of RunWatch, dt (s), steps (done) and warnings (scene_warnings.hpp), which are
+/// told in the cause of a failure.
 /// Where not null, *last receives the final state of a run that reached its end, else is emptied.
 void run_checked(SceneDescription scene, Cell& cell, ParticleState* last = nullptr);
 

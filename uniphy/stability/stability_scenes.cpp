@@ -1,5 +1,6 @@
 #include "uniphy/stability/stability_scenes.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "uniphy/geometry/shape_catalogue.hpp"
@@ -9,13 +10,17 @@ namespace {
 
 /// A cell of the grid of 20 nodes that all scenes have, and the plane of its walls (bound 3).
 constexpr double kCell = 0.05, kWall = 0.1;
+/// The side of the benchmark cube, which `per_side` counts particles along; smaller bodies have as
+/// many to a cell.
+constexpr double kBenchmarkSide = 0.5;
 
 BodyDescription cube(const kernels::LawDescription& law, double size, std::int64_t per_side) {
   BodyDescription body;
   body.name = "cube";
   body.solid = make_shape("box");
   body.filling.kind = Filling::Kind::per_side;
-  body.filling.count = per_side;
+  body.filling.count = std::max<std::int64_t>(
+      2, std::llround(static_cast<double>(per_side) * size / kBenchmarkSide));
   body.placement.size = size;
   body.law = law;
   return body;
@@ -31,10 +36,10 @@ SceneDescription without_gravity(std::int64_t steps) {
 }  // namespace
 
 SceneDescription cube_on_floor(const kernels::LawDescription& law, std::int64_t per_side,
-                               std::int64_t steps) {
+                               std::int64_t steps, double size) {
   SceneDescription scene;
   scene.steps = steps;
-  BodyDescription body = cube(law, 0.5, per_side);
+  BodyDescription body = cube(law, size, per_side);
   body.velocity = {1, -1.5, -2};
   body.angular_velocity = {4, 4, 4};
   body.on_floor = true;

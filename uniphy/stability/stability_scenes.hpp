@@ -6,10 +6,13 @@
 
 namespace uniphy::stability {
 
+/// per_side: particles along 0.5 m of a body; 10 are one a cell.
+
 /// The benchmark cube of the field (NCLaw: side 0.5 m, v = (1, −1.5, −2) m/s, 4 rad/s about each
-/// axis, n = 20), set on the floor, so that it is hit in the first step however short the step is.
+/// axis, n = 20), set on the floor, so that it is hit in the first step however short the step is;
+/// or a smaller one.
 SceneDescription cube_on_floor(const kernels::LawDescription& law, std::int64_t per_side,
-                               std::int64_t steps);
+                               std::int64_t steps, double size = 0.5);
 
 /// A cube of 0.3 m, a cell away from the wall, thrown at it along y, without gravity.
 SceneDescription thrown_at_wall(const kernels::LawDescription& law, double speed,

@@ -1,5 +1,7 @@
 #include "uniphy/training/latent_fit.hpp"
 
+#include <torch/optim.h>
+
 #include <algorithm>
 #include <limits>
 

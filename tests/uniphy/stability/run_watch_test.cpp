@@ -83,12 +83,22 @@ TEST(RunWatch, ASceneThatCannotBePlacedStops) {
   EXPECT_THAT(cell.failure.cause, HasSubstr("the space between the walls"));
 }
 
+TEST(RunWatch, AFailureThatTheUserWasWarnedOfSaysSo) {
+  SceneDescription scene = cube_on_floor(testing::plasticine_law(), 10, 100);
+  scene.dt = 5 * place_scene(scene).stable_dt;
+  Cell cell;
+  run_checked(scene, cell);
+  EXPECT_EQ(cell.verdict, Verdict::fails);
+  EXPECT_EQ(cell.find("warnings"), 1);
+  EXPECT_THAT(cell.failure.cause, HasSubstr("warned of before the run"));
+}
+
 TEST(RunWatch, ASoftBodyCollapsesAtTwentyMetresASecondAndNotAtOne) {
   const kernels::LawDescription soft = testing::elastic_law(350, 500);
   Cell slow, fast;
-  run_checked(thrown_at_wall(soft, 1, 5, 300), slow);
+  run_checked(thrown_at_wall(soft, 1, 10, 300), slow);
   EXPECT_EQ(slow.verdict, Verdict::holds);
-  run_checked(thrown_at_wall(soft, 50, 5, 300), fast);
+  run_checked(thrown_at_wall(soft, 50, 10, 300), fast);
   EXPECT_EQ(fast.verdict, Verdict::fails);
   EXPECT_THAT(fast.failure.cause, HasSubstr("collapsed"));
 }
