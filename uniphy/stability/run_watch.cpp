@@ -79,14 +79,15 @@ bool RunWatch::look(std::int64_t step, const ParticleState& state) {
   if (!(least > kLeastVolume)) {
     violate(step, smallest,
             fmt::format("det F = {:.3g}: the body has collapsed to where its law clamps det F and "
-                        "resists no further, in silence",
+                        "resists no further, and no error says so",
                         least));
   }
   if (!(growth_ <= kEnergyTolerance)) {
     violate(step, fastest,
-            fmt::format("the energy is {:.3g} times what the motion began with, in silence; the "
-                        "fastest particle has {:.3g} m/s",
-                        kept_, std::sqrt(top)));
+            fmt::format(
+                "the energy is {:.3g} times what the motion began with, and no error says so; the "
+                "fastest particle has {:.3g} m/s",
+                kept_, std::sqrt(top)));
   }
   return !violated_;
 }
