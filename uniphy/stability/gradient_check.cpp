@@ -18,10 +18,11 @@ namespace {
 
 using torch::Tensor;
 
-constexpr std::int64_t kStatesAtOnce = 4096;
+constexpr std::int64_t kStatesAtOnce = 4096;  // about 20 MB of temporaries
 /// Two differences of a smooth function agree to about 1e-9; 1e-6 leaves room, and an error of
 /// kGradientTolerance still stands out.
 constexpr double kAgreement = 1e-6;
+/// Functions and weights are of order one: below this a gradient counts as 0.
 constexpr double kLeastNorm = 1e-3;
 
 /// One number a state.
