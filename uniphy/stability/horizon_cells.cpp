@@ -86,27 +86,28 @@ void measure(const SceneDescription& scene, bool single, std::uint64_t seed, Cel
       return (loss(moved(scene, h), w) - loss(moved(scene, -h), w)) / (2 * h);
     };
     const double wide = quotient(1e-4), narrow = quotient(1e-5);
-    const bool chaos = !(std::abs(wide - narrow) <= kChaos * std::abs(narrow));
     const auto error_of = [&](double quotient_of_loss) {
       return std::abs(a.by_parameter - quotient_of_loss) / std::abs(quotient_of_loss);
     };
     const double limit = single ? kLongTolerance32 : kLongTolerance64;
+    const bool agree = std::abs(wide - narrow) <= kChaos * std::abs(narrow);
     double error = error_of(narrow);
-    bool kink = false;
-    if (!chaos && error > limit) {
+    bool local = false;
+    if (!agree || error > limit) {
       const double closest = quotient(kClosest);
       out.set("quotient_closest", closest);
-      kink = error_of(closest) <= std::max(limit, kClosestNoise);
-      if (kink) error = error_of(closest);
+      local = error_of(closest) <= std::max(limit, kClosestNoise);
+      if (local) error = error_of(closest);
     }
+    const bool chaos = !agree && !local;
     out.set("adjoint_growth", a.growth);
     out.set("gradient", a.by_parameter);
     out.set("quotient_wide", wide);
     out.set("quotient_narrow", narrow);
     out.set("chaos", chaos ? 1 : 0);
-    out.set("kink", kink ? 1 : 0);
+    out.set("local", local ? 1 : 0);
     if (!chaos) out.set("gradient_error", error);
-    out.verdict = a.finite && (chaos || kink || error <= limit) ? Verdict::holds : Verdict::fails;
+    out.verdict = a.finite && (chaos || local || error <= limit) ? Verdict::holds : Verdict::fails;
     if (out.verdict == Verdict::holds) return;
     out.failure.cause =
         a.finite ? fmt::format("the adjoint differs from both quotients by {:.2g} of them", error)

@@ -15,7 +15,7 @@ constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 /// One row and column.
 struct Group {
-  std::int64_t all = 0, holds = 0, stops = 0, chaos = 0, kinks = 0;
+  std::int64_t all = 0, holds = 0, stops = 0, chaos = 0, local = 0;
   double worst = kNone;     ///< of the deciding number
   double finite = 1;        ///< the least share of finite gradients
   double derivative = 1;    ///< the least share of states with a derivative
@@ -39,7 +39,7 @@ Group group_of(const std::vector<Cell>& cells, const std::string& stressor,
     g.holds += c.verdict == Verdict::holds ? 1 : 0;
     g.stops += c.verdict == Verdict::stops ? 1 : 0;
     g.chaos += c.find("chaos").value_or(0) != 0 ? 1 : 0;
-    g.kinks += c.find("kink").value_or(0) != 0 ? 1 : 0;
+    g.local += c.find("local").value_or(0) != 0 ? 1 : 0;
     g.deciding = c.deciding;
     g.finite = std::min(g.finite, c.find("finite_share").value_or(1));
     g.derivative = std::min(g.derivative, c.find("derivative_share").value_or(1));
@@ -88,7 +88,7 @@ std::string entry(const Group& g) {
   text += "; " + number_of(g);
   if (g.holds + g.stops < g.all && g.stops > 0) text += fmt::format("; {} stop", g.stops);
   if (g.chaos > 0) text += fmt::format("; {} chaotic", g.chaos);
-  if (g.kinks > 0) text += fmt::format("; {} at a kink", g.kinks);
+  if (g.local > 0) text += fmt::format("; {} local", g.local);
   return text + " |";
 }
 
@@ -171,7 +171,8 @@ std::string survival_table(const std::vector<Cell>& cells) {
   text +=
       "\nholds n/N: settings that hold of all, and the worst number; stops: the others end with an "
       "error that names what is wrong; fails: something is wrong in silence. finite: the least "
-      "share of finite gradients of a setting.\n\n";
+      "share of finite gradients of a setting. local: the gradient is right, but the motion bends "
+      "within 1e-5 of the parameter; chaotic: difference quotients disagree among themselves.\n\n";
   for (const Method& m : columns) text += fmt::format("- {}: {}.\n", m.name, m.text);
   return text;
 }
