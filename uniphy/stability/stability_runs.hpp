@@ -10,7 +10,7 @@ inline constexpr std::int64_t kLookEvery = 10;
 
 /// ε of the method mass_epsilon, kg, added to the mass of every node: a millionth of the mass of a
 /// particle of the benchmark cube (0.125 kg), of the size that such terms have. It takes 4e-4 of
-/// that cube's momentum in 300 steps.
+/// the momentum of a smaller cube of such particles in 300 steps (light_body).
 inline constexpr double kMassEpsilon = 1e-7;
 
 /// Rolls the scene out with the engine and judges it by RunWatch. An Error of the engine or of the
