@@ -13,7 +13,7 @@ git grep -n '^ *# *include *[<"]' -- '*.hpp' '*.cpp' '*.h' | awk -F: '
   BEGIN {
     count = split("ops/kernels/ ops/ models/ uniphy/io/ uniphy/config/ uniphy/report/ " \
                   "uniphy/geometry/ uniphy/scene/ uniphy/data/ uniphy/training/ " \
-                  "uniphy/inference/ uniphy/evaluation/ uniphy/identify/ uniphy/bench/ " \
+                  "uniphy/inference/ uniphy/stability/ uniphy/evaluation/ uniphy/identify/ uniphy/bench/ " \
                   "experiments/ tests/", layer, " ")
     torch_free = "^(ops/kernels|uniphy/(io|config|report|geometry|scene|data))/"
   }

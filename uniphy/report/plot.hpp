@@ -35,6 +35,17 @@ struct Chart {
 /// length) or the file cannot be written.
 bool plot_chart(const std::filesystem::path& png, const Chart& chart);
 
+/// A table in colours: what a row comes to in a column.
+struct ValueMap {
+  std::string title;
+  std::vector<std::string> rows, columns;
+  std::vector<double> values;      ///< [rows, columns], 0 (bad) … 1 (good); NaN: grey
+  std::vector<std::string> texts;  ///< [rows, columns], a few letters inside the field
+};
+
+/// Throws Error where the numbers of values or texts do not fit, or the file cannot be written.
+bool plot_map(const std::filesystem::path& png, const ValueMap& map);
+
 struct ParticlePanel {
   std::string caption;
   std::vector<double> x;       ///< [particles, 3] m, y upwards

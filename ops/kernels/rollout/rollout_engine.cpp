@@ -9,6 +9,7 @@
 
 #include "ops/kernels/base/error.hpp"
 #include "ops/kernels/base/team_barrier.hpp"
+#include "ops/kernels/rollout/lost_particle.hpp"
 #include "ops/kernels/simd/prefetch.hpp"
 
 namespace uniphy::kernels {
@@ -237,7 +238,7 @@ void RolloutEngine<T>::throw_if_lost(std::ptrdiff_t step) {
       "a step); expected positions in [%.6g, %.6g) m; likely cause: %s",
       particle, x[0], x[1], x[2], finite ? "left the grid" : "is not finite", step, speed, cells,
       0.5 * grid.dx(), 1 - 1.5 * grid.dx(), cause);
-  throw Error(text);
+  throw LostParticle(text, particle, step);
 }
 
 template class RolloutEngine<float>;
