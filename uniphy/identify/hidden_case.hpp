@@ -31,7 +31,7 @@ struct HiddenCase {
 HiddenCase draw_hidden_case(const HiddenCaseOptions& options, std::int64_t material,
                             FrameFields fields = {});
 
-/// What inference may see of the first scene.
+/// All that there is to see of the first scene.
 Observation observation_of(const HiddenCase& hidden);
 
 }  // namespace uniphy

@@ -12,7 +12,10 @@
 
 #include "ops/kernels/base/error.hpp"
 #include "uniphy/data/random_law.hpp"
+#include "uniphy/identify/identify_table.hpp"
 #include "uniphy/inference/fit_findings.hpp"
+#include "uniphy/inference/motion_objective.hpp"
+#include "uniphy/inference/observed_motion.hpp"
 #include "uniphy/io/atomic_file.hpp"
 #include "uniphy/io/latent_file.hpp"
 #include "uniphy/io/observation.hpp"
@@ -24,6 +27,12 @@ namespace uniphy {
 namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+/// What a case that failed has none of.
+void forget_numbers(Identified& row) {
+  row.fit_mse = row.fit_share = row.found_mse = row.found_share = kNan;
+  row.other_best = row.resim_mse = row.resim_share = kNan;
+}
 
 /// From here on peak_memory_mb() counts anew, where the kernel allows it.
 void reset_peak_memory() {
@@ -53,6 +62,36 @@ Trajectory predict(const HiddenCase& hidden, const kernels::LawDescription& law,
   return run_scene(scene, fields);
 }
 
+/// Where the law found takes all particles, of which a part was observed.
+Trajectory all_particles(const Observation& whole, const Inference& found, const std::string& name,
+                         const std::string& dtype, bool with_F) {
+  Trajectory t = observed_trajectory(whole);
+  t.x.clear();
+  const auto objective =
+      make_motion_objective(whole, observed_steps(whole, name), observed_grid(whole, name), dtype);
+  objective->simulate(found.fit.law, found.fit.motion,
+                      [&](std::ptrdiff_t, const std::vector<double>& x) {
+                        t.x.insert(t.x.end(), x.begin(), x.end());
+                      });
+  if (with_F) t.F = objective->deformations(found.fit.law, found.fit.motion, whole.frames);
+  return t;
+}
+
+/// What was found beside what the hidden law is, both read by the same probe.
+void name_material(const HiddenCase& hidden, const Observation& observation,
+                   const Inference& result, Identified& row) {
+  const MaterialBelief& belief = result.material;
+  row.named = result.fit.determined ? belief.reading.material : "not determined";
+  const double strain = result.fit.determined ? belief.reading.strain_seen : 0.1;
+  const MaterialReading truth = read_material(hidden.observed.law(), observation.dt, strain,
+                                              observation.time.back() - observation.time.front());
+  row.named_right = row.named == truth.material;
+  row.truth = reading_text(truth);
+  if (!result.fit.determined) return;
+  row.numbers = reading_text(belief);
+  if (!belief.probability.empty()) row.probability = belief.probability.front().second;
+}
+
 CaseResult identify_one(const IdentifyOptions& options, std::int64_t material,
                         const FitVariables& variables, const RunDirectory& out) {
   const auto start = std::chrono::steady_clock::now();
@@ -61,7 +100,7 @@ CaseResult identify_one(const IdentifyOptions& options, std::int64_t material,
   Identified& row = found.row;
   CasePictures& pictured = found.pictures;
   row.material = options.hidden.draw.materials[material].name();
-  row.fit_mse = row.fit_share = row.other_best = row.resim_mse = row.resim_share = kNan;
+  forget_numbers(row);
   const std::filesystem::path folder = out.file(row.material);
   make_directory(folder);
 
@@ -70,27 +109,31 @@ CaseResult identify_one(const IdentifyOptions& options, std::int64_t material,
   const HiddenCase hidden = draw_hidden_case(options.hidden, material, fields);
   row.shape = hidden.observed.record.shape;
   row.other_shape = hidden.other.record.shape;
-  write_observation(folder / "observation.h5", observation_of(hidden));
+  const Observation whole = observation_of(hidden);
+  write_observation(folder / "observation.h5", laboratory_view(whole, options.view));
 
   // From here on inference knows nothing but that file and the model.
   const std::string name = (folder / "observation.h5").string();
   const Observation observation = read_observation(name);
   std::fprintf(stderr, "%s\n", row.material.c_str());
-  AdaptationOptions adaptation{{Rung::latent}};
-  adaptation.samples = 0;  // the table has no intervals
-  Inference result = infer(observation, name, variables, options.fit, {}, adaptation);
-  if (fields.F) result.fitted.F = std::move(result.deformation);
+  const Inference result = infer(observation, name, variables, options.fit, {}, options.adaptation);
   write_latent(folder / "latent.h5",
                latent_of(result, observation, variables, options.variables.model.string(),
                          out.config_yaml()));
-  write_trajectory(folder / "fitted.h5", result.fitted);
+  pictured.whole = observed_trajectory(whole);
+  write_trajectory(folder / "truth.h5", pictured.whole);
+  pictured.fitted = all_particles(whole, result, name, options.fit.dtype, fields.F);
+  write_trajectory(folder / "fitted.h5", pictured.fitted);
   plot_chart(folder / "loss.png", loss_chart(result.fit, variables, row.material));
+  row.noise_share = result.check.noise / result.size;
   row.fit_mse = result.fit_mse;
   row.fit_share = std::sqrt(result.fit_mse) / result.size;
-  row.roll_outs = result.fit.history.size();
-  row.roll_outs_to_a_hundredth = roll_outs_to_a_hundredth(result.fit).value_or(0);
-  row.nearest = result.fit.determined ? variables.nearest(result.fit.u, 1).front().material
-                                      : "not determined";
+  const TrajectoryComparison seen = compare_trajectories(
+      pictured.fitted, pictured.whole, FrameMatch::all, "the fitted motion", "the true one");
+  row.found_mse = seen.position_mse;
+  row.found_share = seen.root_over_size;
+  row.roll_outs = static_cast<std::size_t>(result.roll_outs);
+  name_material(hidden, observation, result, row);
   for (const std::string& warning : fit_warnings(result, observation, variables)) {
     std::fprintf(stderr, "warning: %s: %s\n", name.c_str(), warning.c_str());
   }
@@ -103,7 +146,6 @@ CaseResult identify_one(const IdentifyOptions& options, std::int64_t material,
 
   pictured.material = row.material;
   pictured.observed = observed_trajectory(observation);
-  pictured.fitted = result.fitted;
   pictured.best = best_so_far(result.fit);
   pictured.truth = hidden.other_truth;
   write_trajectory(folder / "other_truth.h5", hidden.other_truth);
@@ -137,14 +179,17 @@ void add_row(Metrics& metrics, const Identified& row) {
   const auto set = [&](const char* name, double value) {
     metrics.set(fmt::format("{}.{}", name, row.material), value);
   };
+  set("noise_over_size", row.noise_share);
   set("fit_mse", row.fit_mse);
+  set("found_mse", row.found_mse);
   set("resim_mse", row.resim_mse);
   set("fit_beats_other", row.beats_other ? 1 : 0);
   set("fit_root_over_size", row.fit_share);
+  set("found_root_over_size", row.found_share);
+  set("named_right", row.named_right ? 1 : 0);
   set("resim_root_over_size", row.resim_share);
   set("other_best_mse", row.other_best);
   set("roll_outs", static_cast<double>(row.roll_outs));
-  set("roll_outs_to_a_hundredth", static_cast<double>(row.roll_outs_to_a_hundredth));
   set("seconds", row.wall_s);
   set("memory_mb", row.memory_mb);
 }
@@ -160,7 +205,7 @@ void show_motions(const std::vector<Identified>& rows, const std::vector<CasePic
     playback.low = grid.bound * grid.dx();
     playback.high = 1 - playback.low;
     playback.motions = {
-        motion_of("observed", p.observed), motion_of("fitted", p.fitted, "observed", p.observed),
+        motion_of("observed", p.observed), motion_of("fitted", p.fitted, "truth", p.whole),
         motion_of("predicted", p.predicted, "truth", p.truth), motion_of("truth", p.truth)};
     report.playbacks.push_back(std::move(playback));
   }
@@ -208,21 +253,6 @@ void draw_pictures(const std::vector<CasePictures>& all, RunDirectory& out) {
 
 }  // namespace
 
-std::string identify_table(const std::vector<Identified>& rows) {
-  std::string text =
-      "| material | observed | fit mse (m²) | root/size | best code of another material (m²) | "
-      "re-simulated | mse (m²) | root/size | nearest code | roll-outs | time (s) | memory (MB) |\n"
-      "|---|---|---|---|---|---|---|---|---|---|---|---|\n";
-  for (const Identified& r : rows) {
-    text += fmt::format(
-        "| {} | {} | {:.2e} | {:.3f} % | {:.2e} | {} | {:.2e} | {:.3f} % | {} | {} | {:.1f} | "
-        "{:.0f} |\n",
-        r.material, r.shape, r.fit_mse, 100 * r.fit_share, r.other_best, r.other_shape, r.resim_mse,
-        100 * r.resim_share, r.nearest, r.roll_outs, r.wall_s, r.memory_mb);
-  }
-  return text;
-}
-
 void identify(const IdentifyOptions& options, RunDirectory& out, Metrics& metrics) {
   const auto variables = options.variables.load();
   // The scenes follow from the configuration.
@@ -240,7 +270,7 @@ void identify(const IdentifyOptions& options, RunDirectory& out, Metrics& metric
       pictures.push_back(std::move(found.pictures));
     } catch (const Error& error) {
       row.material = name;
-      row.fit_mse = row.fit_share = row.other_best = row.resim_mse = row.resim_share = kNan;
+      forget_numbers(row);
       failures += fmt::format("; {}: {}", row.material, error.what());
     }
     add_row(metrics, row);

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "uniphy/data/laboratory_view.hpp"
 #include "uniphy/identify/case_result.hpp"
 #include "uniphy/identify/hidden_case.hpp"
 #include "uniphy/inference/infer_run.hpp"
@@ -14,21 +15,21 @@ namespace uniphy {
 /// The main job: identify objects of undisclosed material and predict them elsewhere.
 struct IdentifyOptions {
   HiddenCaseOptions hidden;
+  LaboratoryView view;  ///< what inference sees of the first scene
   FitVariablesSource variables;
   FitOptions fit;
+  AdaptationOptions adaptation;
 };
 
 /// Declares and reads all keys.
 IdentifyOptions read_identify_options(Section& config);
 
-/// Does all materials, prints and writes the table, the pictures and the metrics fit_mse.M,
-/// resim_mse.M, fit_beats_other.M, fit_root_over_size.M, resim_root_over_size.M, other_best_mse.M,
-/// roll_outs.M, roll_outs_to_a_hundredth.M (0: not reached), seconds.M, memory_mb.M. An interrupted
-/// run goes on with the materials that it has finished. Throws Error at the end where a number is
-/// not finite.
+/// Does all materials, prints and writes the table, the pictures and the metrics fit_mse.M (of what
+/// was observed), found_mse.M (of all particles against where they were), resim_mse.M,
+/// noise_over_size.M, fit_root_over_size.M, found_root_over_size.M, resim_root_over_size.M,
+/// fit_beats_other.M, other_best_mse.M, named_right.M (1 or 0), roll_outs.M, seconds.M,
+/// memory_mb.M. An interrupted run goes on with the materials that it has finished. Throws Error at
+/// the end where a number is not finite.
 void identify(const IdentifyOptions& options, RunDirectory& out, Metrics& metrics);
-
-/// The table in Markdown.
-std::string identify_table(const std::vector<Identified>& rows);
 
 }  // namespace uniphy

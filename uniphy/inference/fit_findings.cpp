@@ -12,10 +12,11 @@ namespace uniphy {
 namespace {
 
 /// Over size, of cloud_noise: from here on little more than the path of the centre is seen. A
-/// choice: 500 points of a cube of 1000 leave 3 %, 60 of 216 leave 9 %.
+/// choice: 500 points of a cube of 1000 particles leave 2.5 % (README).
 constexpr double kSparseCloud = 0.15;
 
 }  // namespace
+
 bool FittedParameter::outside() const {
   constexpr double kRounding = 1e-6;
   return value < range[0] * (1 - kRounding) || value > range[1] * (1 + kRounding);

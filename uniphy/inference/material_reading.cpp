@@ -22,6 +22,8 @@ constexpr double kPressed = 0.02, kUnpressed = 1e-6;
 /// A material that yields under next to no pressure at less than this part of what it bears under
 /// kPressed is sand: of a von Mises solid it is 1.
 constexpr double kSandShare = 0.2;
+/// rad. Sand that a slope of less lets slide is a fluid; the families' least friction is 0.01.
+constexpr double kLeastFriction = 0.005;
 /// Share of what exceeds the yield strain that is left after a step, from which a flow has a rate.
 /// A choice: the two families meet where a non-Newtonian body's viscosity is small.
 constexpr double kFlowShare = 0.03;
@@ -101,6 +103,9 @@ Moduli moduli(const Probe& probe, double compression) {
 }
 
 void read_fluid(const Probe& probe, double bulk, MaterialReading& m) {
+  const double strain_seen = m.strain_seen;
+  m = {};
+  m.strain_seen = strain_seen;
   m.material = "newtonian";
   m.lambda = bulk;
   Matrix3d C = Matrix3d::Zero();
@@ -122,6 +127,10 @@ void read_yield(const Probe& probe, double dt, double duration, MaterialReading&
         (pressed - free) / (kPressed - kUnpressed) * 2 * m.mu / (3 * m.lambda + 2 * m.mu);
     const double s = alpha * std::sqrt(1.5);
     m.friction_angle = std::asin(std::clamp(3 * s / (2 + s), 0.0, 1.0));
+    if (m.friction_angle < kLeastFriction) {
+      read_fluid(probe, m.lambda + 2 * m.mu / 3, m);
+      return;
+    }
     // The cone meets the deviator at ‖s₀‖ = 2√6 c cos θ/(3 − sin θ) where there is no pressure.
     const double slope = (pressed - free) / (kPressed - kUnpressed);
     const double s0 = 2 * m.mu * std::max(0.0, free - slope * kUnpressed);

@@ -13,9 +13,10 @@ namespace uniphy {
 struct MaterialReading {
   static constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
-  /// elastic, newtonian (any fluid), plasticine (yields, and all that exceeds flows off within a
-  /// step), sand (bears no shear without pressure) or non_newtonian (yields, and flows at a rate).
-  /// A body that did not yield at the strains that it saw is called elastic.
+  /// elastic, newtonian (any fluid: sand with a friction below 0.005 rad is one), plasticine
+  /// (yields, and all that exceeds flows off within a step), sand (bears no shear without pressure)
+  /// or non_newtonian (yields, and flows at a rate). A body that did not yield at the strains that
+  /// it saw is called elastic.
   std::string material;
   double mu = kNone;      ///< Pa, of small shear, from slight compressions to none
   double lambda = kNone;  ///< Pa; of a fluid its bulk modulus

@@ -40,8 +40,8 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Values(
         BadConfig{
             "UnknownKind", evaluate_stage, "kind: rollout\n",
-            "c.yaml:1: kind: expected one of trajectory, heldout, outside, open_world, materials, "
-            "found \"rollout\""},
+            "c.yaml:1: kind: expected one of trajectory, heldout, outside, open_world, touching, "
+            "materials, found \"rollout\""},
         BadConfig{"NoTrajectory", evaluate_stage, "frames: all\n",
                   "c.yaml:1: trajectory: required key is missing, expected a file"},
         BadConfig{

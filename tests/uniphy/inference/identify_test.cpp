@@ -3,9 +3,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "tests/uniphy/inference/observed_scene.hpp"
 #include "tests/uniphy/support/scratch.hpp"
+#include "uniphy/identify/identify_table.hpp"
 #include "uniphy/io/atomic_file.hpp"
+#include "uniphy/io/observation.hpp"
+#include "uniphy/io/trajectory.hpp"
 
 namespace uniphy {
 namespace {
@@ -14,13 +19,16 @@ using ::testing::HasSubstr;
 
 IdentifyOptions small_job(const testing::Scratch& scratch) {
   write_model(scratch.file("model.h5"), testing::readable_model());
-  const Config config = Config::parse(
-      "law: {type: learned, model: " + scratch.file("model.h5").string() +
-      "}\n"
-      "materials: [elastic, plasticine]\n"
-      "scene: {grid: 16, steps: 240, particles: 200, shapes: [box, sphere], size: [0.3, 0.32], "
-      "speed: [3, 4], gap: [0, 0.01]}\n"
-      "fit: {schedule: {horizon: [1], candidates: [2], epochs: [3]}}\n");
+  const Config config =
+      Config::parse("law: {type: learned, model: " + scratch.file("model.h5").string() +
+                    "}\n"
+                    "materials: [elastic, plasticine]\n"
+                    "scene: {grid: 16, dt: 2.5e-4, steps: 240, particles: 200, shapes: [box, "
+                    "sphere], size: [0.3, 0.32], "
+                    "speed: [3, 4], gap: [0, 0.01]}\n"
+                    "observed: {points: 0.2, every: 4, noise: 0.002}\n"
+                    "adaptation: {rungs: [latent], samples: 8, iterations: 2}\n"
+                    "fit: {schedule: {horizon: [1], candidates: [2], epochs: [3]}}\n");
   Section root = config.root();
   IdentifyOptions options = read_identify_options(root);
   config.finish();
@@ -68,6 +76,41 @@ TEST(Identify, AnInterruptedRunGoesOnWithTheCasesThatAreDone) {
   for (const char* material : {"elastic", "plasticine"}) {
     EXPECT_FALSE(std::filesystem::exists(directory / material / "case.h5"));
   }
+}
+
+TEST(Identify, SeesNoMoreThanItIsShown) {
+  const testing::Scratch scratch;
+  IdentifyOptions options = small_job(scratch);
+  options.hidden.draw.materials.resize(1);
+  const Metrics found = run(options, scratch.file("out"), "yaml");
+  const Observation seen = read_observation(scratch.file("out") / "elastic" / "observation.h5");
+  const Trajectory truth = read_trajectory(scratch.file("out") / "elastic" / "truth.h5");
+  EXPECT_TRUE(seen.tracked());
+  EXPECT_NEAR(double(seen.points()), 0.2 * double(truth.particles), 1);
+  EXPECT_EQ(seen.frames, (truth.frames + 3) / 4);
+  EXPECT_GE(seen.noise, 0.002 * 0.3);
+  EXPECT_LE(seen.noise, 0.002 * 0.32 * std::sqrt(3.0));  // the largest side of a turned box
+  EXPECT_NEAR(*found.find("noise_over_size.elastic"), 0.002, 1e-4);
+  // All particles are judged, by where they were.
+  EXPECT_EQ(read_trajectory(scratch.file("out") / "elastic" / "fitted.h5").particles,
+            truth.particles);
+  EXPECT_GT(*found.find("found_mse.elastic"), 0);
+  EXPECT_THAT(read_text_file(scratch.file("out") / "table.md"), HasSubstr("| elastic | "));
+}
+
+TEST(Identify, TheNumbersOfAMaterialAreThoseItIsKnownBy) {
+  MaterialBelief belief;
+  belief.reading.material = "plasticine";
+  belief.reading.mu = 1.5e5;
+  belief.reading.lambda = 2e5;
+  belief.reading.yield_stress = 5e3;
+  EXPECT_EQ(reading_text(belief.reading), "μ 1.5e+05 Pa, τ_Y 5e+03 Pa");
+  belief.low.mu = 1.4e5;
+  belief.high.mu = 1.6e5;
+  EXPECT_EQ(reading_text(belief), "μ 1.5e+05 [1.4e+05, 1.6e+05] Pa, τ_Y 5e+03 Pa");
+  belief.reading.material = "newtonian";
+  belief.reading.viscosity = 12;
+  EXPECT_EQ(reading_text(belief.reading), "η 12 Pa s, κ 2e+05 Pa");
 }
 
 TEST(Identify, ResumesNothingOfAnotherConfigurationOrModel) {

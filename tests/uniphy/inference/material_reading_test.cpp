@@ -57,6 +57,19 @@ TEST(MaterialReading, FrictionAngleOfSand) {
   }
 }
 
+TEST(MaterialReading, SandWithoutFrictionIsAFluid) {
+  LawDescription law = law_of(LawId::sand, 3e5, 2e5);
+  law.theta = 0.01;  // the least of the family
+  EXPECT_EQ(read_material(law, kStep, 0.3).material, "sand");
+  law.theta = 1e-3;
+  const MaterialReading m = read_material(law, kStep, 0.3);
+  EXPECT_EQ(m.material, "newtonian");
+  EXPECT_NEAR(m.lambda, 4e5, 4e3);  // the bulk modulus
+  EXPECT_NEAR(m.viscosity, 0, 1e-6);
+  EXPECT_TRUE(std::isnan(m.friction_angle));
+  EXPECT_TRUE(std::isnan(m.mu));
+}
+
 TEST(MaterialReading, CohesionOfSandThatBearsTension) {
   LawDescription law = law_of(LawId::cohesive_sand, 3e5, 2e5);
   law.theta = 0.4;
