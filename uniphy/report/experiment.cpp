@@ -64,7 +64,8 @@ std::string help_text(const ExperimentInfo& info, const DeclareFunction& declare
   add_lines(
       text, "Options",
       {"--set KEY=VALUE  sets a key over the file, value in YAML (bodies.0.density=500);",
-       "                 KEY= takes it back to its default",
+       "                 KEY=null takes it back, as if the file did not give it; also a whole",
+       "                 section, and an entry of a list (bodies.1=null)",
        fmt::format("--out DIR        output directory, default {}",
                    default_directory(info, "CONFIG")),
        "--threads N      threads, default what OpenMP takes (OMP_NUM_THREADS)",
