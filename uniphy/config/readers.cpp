@@ -227,7 +227,7 @@ std::optional<double> Section::real_or(const std::string& word, const std::strin
     return number ? std::optional<Value>(number) : std::nullopt;
   };
   const auto show = [&](const Value& value) {
-    return value ? plain_real(*value) : scalar_node(word, false);
+    return value ? plain_real(*value) : same_text(word);
   };
   return scalar<Value>(key, fallback,
                        {real_noun(range), fmt::format("{} or \"{}\"", range.text(), word), unit},

@@ -180,7 +180,9 @@ TEST(Config, SectionFailNamesThePlace) {
 
 TEST(Config, TextThatLooksLikeANumberStaysText) {
   for (const char* text :
-       {"1:30", "0x10", "1_000", "2001-01-01", "no", "On", "y", "5e-05", ".5", "~"}) {
+       {"1:30",  "1:20:30.5", "0x1F", "0b1",   "017",  "1_000", "-1_0", "2001-01-01",
+        "yes",   "no",        "On",   "OFF",   "True", "y",     "Null", "~",
+        "5e-05", ".5",        ".inf", "-.INF", ".nan", "=",     "<<"}) {
     const Config config = Config::parse(std::string("name: \"") + text + "\"\n");
     EXPECT_EQ(config.root().text("name", "", "doc"), text);
     EXPECT_EQ(config.resolved(), std::string("name: \"") + text + "\"\n");

@@ -58,6 +58,21 @@ TEST(Document, EmittedTextReadsBackToTheSameTree) {
   EXPECT_EQ(twice->find("odd key")->text, "1");
 }
 
+TEST(Document, EmittedTextEscapesWhatReadersOfYamlStumbleOver) {
+  // Next line, line and paragraph separators, a byte order mark, a control character, no character.
+  const auto root = parse_document(
+      "a: \"\\x01 \\x7F \\x85 \\u009F \\u2028 \\u2029 \\uFEFF \\uFFFE \\uFFFF\"\n"
+      "b: \"\\xA0 \\u03BC \\U0001F600\"\n",
+      "f");
+  const std::string emitted = emit_document(*root);
+  EXPECT_EQ(emitted,
+            "a: \"\\u0001 \\u007F \\u0085 \\u009F \\u2028 \\u2029 \\uFEFF \\uFFFE \\uFFFF\"\n"
+            "b: \"\xC2\xA0 \xCE\xBC \xF0\x9F\x98\x80\"\n");
+  const auto again = parse_document(emitted, "f");
+  EXPECT_EQ(again->find("a")->text, root->find("a")->text);
+  EXPECT_EQ(again->find("b")->text, root->find("b")->text);
+}
+
 TEST(Override, SetsReplacesAndAppends) {
   const auto root = parse_document("scene: {grid: 20}\nbodies:\n  - density: 1\n", "f");
   apply_override(*root, "scene.grid=32");
