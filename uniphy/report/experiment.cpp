@@ -12,10 +12,11 @@
 #include <chrono>
 #include <csignal>
 #include <cstdio>
-#include <tuple>
+#include <optional>
 
 #include "ops/kernels/base/error.hpp"
 #include "uniphy/io/atomic_file.hpp"
+#include "uniphy/report/directory_listing.hpp"
 #include "uniphy/report/interrupt.hpp"
 #include "uniphy/report/report_writer.hpp"
 
@@ -120,37 +121,41 @@ class Undo {
     }
   }
   /// Call when the frame's own files have been written, and the work begins.
-  void begin() { before_ = listing(); }
+  void begin() { before_.emplace(directory_); }
 
   void run() const {
-    if (listing() != before_) return;  // there are products: they need their configuration
+    // Where there are products, they need their configuration.
+    if (!before_ || !(DirectoryListing(directory_) == *before_)) return;
     std::filesystem::remove(directory_ / kConfig, ignored_);
     for (const auto& [name, text] : kept_) write_text_file(directory_ / name, text);
     for (const auto& d : made_) std::filesystem::remove(d, ignored_);  // if empty
   }
 
+  /// What the work has written, in a line.
+  std::string products() const {
+    std::vector<std::string> names;
+    if (before_) names = DirectoryListing(directory_).changed_since(*before_);
+    const bool report = std::filesystem::exists(directory_ / kReport, ignored_);
+    for (const char* own : {kReport, kMetrics, kConfig}) {
+      names.erase(std::remove(names.begin(), names.end(), own), names.end());
+    }
+    std::string text = joined_names(names, kProducts);
+    for (const char* own : {report ? kReport : "", kMetrics, kConfig}) {
+      if (*own) text += (text.empty() ? "" : ", ") + std::string(own);
+    }
+    return text;
+  }
+
+  static constexpr std::size_t kProducts = 8;  ///< named in the line
   static constexpr const char* kConfig = "config.yaml";
   static constexpr const char* kMetrics = "metrics.json";
   static constexpr const char* kReport = "report.html";
 
  private:
-  using Entry = std::tuple<std::filesystem::path, std::filesystem::file_time_type, std::uintmax_t>;
-  std::vector<Entry> listing() const {
-    std::vector<Entry> all;
-    std::filesystem::recursive_directory_iterator at(directory_, ignored_), end;
-    for (; at != end; at.increment(ignored_)) {
-      const bool file = at->is_regular_file(ignored_);
-      all.emplace_back(at->path(), at->last_write_time(ignored_),
-                       file ? at->file_size(ignored_) : 0);
-    }
-    std::sort(all.begin(), all.end());
-    return all;
-  }
-
   std::filesystem::path directory_;
   std::vector<std::filesystem::path> made_;  ///< innermost first
   std::vector<std::pair<std::string, std::string>> kept_;
-  std::vector<Entry> before_;
+  std::optional<DirectoryListing> before_;
   mutable std::error_code ignored_;
 };
 
@@ -212,6 +217,8 @@ int run(const CommandLine& line, const ExperimentInfo& info, const DeclareFuncti
   metrics.add_resources(start);
   metrics.write(out.file(Undo::kMetrics));
   report.write(out.file(Undo::kReport), resolved, metrics);
+  std::fflush(stderr);
+  std::printf("%s: %s\n", line.out.c_str(), undo.products().c_str());
   return out.no_answer() ? kNoAnswer : 0;
 }
 
