@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "ops/kernels/base/error.hpp"
+#include "uniphy/config/schema.hpp"
 #include "uniphy/config/state.hpp"
 
 namespace uniphy {
@@ -152,13 +153,16 @@ Config Config::parse(const std::string& text, const std::string& name,
 Config Config::describe() {
   auto state = std::make_shared<State>();
   state->describing = true;
+  state->schema = std::make_shared<SchemaMap>();
   state->given = std::make_shared<Node>();
   state->given->kind = Node::Kind::map;
   state->given->origin = "(describing)";
   return Config(state);
 }
 
-Section Config::root() const { return Section(state_, state_->given, state_->resolved, ""); }
+Section Config::root() const {
+  return Section(state_, state_->given, state_->resolved, "", state_->schema);
+}
 
 bool Config::describing() const { return state_->describing; }
 
@@ -171,6 +175,10 @@ void Config::finish() const {
 std::string Config::resolved() const { return emit_document(*state_->resolved); }
 
 const std::vector<KeyInfo>& Config::keys() const { return state_->keys; }
+
+std::string Config::schema(const std::string& title, const std::string& description) const {
+  return json_schema(state_->schema ? *state_->schema : SchemaMap(), title, description);
+}
 
 std::string Config::table(int width) const {
   std::size_t path_width = 0;

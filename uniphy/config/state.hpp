@@ -17,6 +17,7 @@ struct Config::State {
   std::vector<std::string> taken_back;  ///< overrides that found nothing to take back
   std::vector<std::string> absent;    ///< full paths of what may be given and is not in `resolved`
   std::vector<KeyInfo> keys;          ///< filled while describing
+  std::shared_ptr<SchemaMap> schema;  ///< of the root, filled while describing
   std::vector<std::string> outer;     ///< enclosing variants of keys[i], without its innermost one
   std::vector<std::string> variants;  ///< the variants being read, outermost first
   std::vector<std::string> variant_names;  ///< their alternatives: "elastic" for "type: elastic"

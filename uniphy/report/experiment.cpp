@@ -32,6 +32,7 @@ struct CommandLine {
   int threads = 0;
   bool report = false;
   bool help = false;
+  bool schema = false;
 };
 
 void add_lines(std::string& text, const char* title, const std::vector<std::string>& lines) {
@@ -72,9 +73,19 @@ std::string help_text(const ExperimentInfo& info, const DeclareFunction& declare
        "--threads N      threads, default what OpenMP takes (OMP_NUM_THREADS)",
        "--report         also writes report.html, one file that opens in a browser; needs",
        fmt::format("                 libjs-three, or {} set to three.min.js;", kThreeJsVariable),
-       "                 --no-report takes it back", "--help           this text"});
+       "                 --no-report takes it back",
+       "--schema         prints a JSON Schema of CONFIG.yaml, by which editors complete and check "
+       "it",
+       "--help           this text"});
   add_lines(text, "Examples", info.examples);
   return text + "\nKeys of CONFIG.yaml:\n" + config.table();
+}
+
+std::string schema_text(const ExperimentInfo& info, const DeclareFunction& declare) {
+  Config config = Config::describe();
+  Section root = config.root();
+  declare(root);
+  return config.schema(info.name, info.summary);
 }
 
 /// Throws Error for a malformed command line.
@@ -83,6 +94,7 @@ CommandLine parse_command_line(int argc, const char* const* argv, const Experime
   CLI::App app(info.summary, info.name);
   app.set_help_flag();
   app.add_flag("-h,--help", line.help);
+  app.add_flag("--schema", line.schema);
   app.add_option("CONFIG", line.config);
   app.add_option("--set", line.overrides)->type_size(1)->allow_extra_args(false);
   app.add_option("--out", line.out);
@@ -93,7 +105,7 @@ CommandLine parse_command_line(int argc, const char* const* argv, const Experime
   } catch (const CLI::ParseError& error) {
     throw Error(fmt::format("command line: {}; see {} --help", error.what(), info.name));
   }
-  if (line.help) return line;
+  if (line.help || line.schema) return line;
   if (line.config.empty()) {
     throw Error(fmt::format("command line: expected CONFIG.yaml, found no argument; see {} --help",
                             info.name));
@@ -251,6 +263,10 @@ int run_experiment(int argc, const char* const* argv, const ExperimentInfo& info
     const CommandLine line = parse_command_line(argc, argv, info);
     if (line.help) {
       std::fputs(help_text(info, declare).c_str(), stdout);
+      return 0;
+    }
+    if (line.schema) {
+      std::fputs(schema_text(info, declare).c_str(), stdout);
       return 0;
     }
     return run(line, info, declare, start);

@@ -3,6 +3,7 @@
 // The frame of every binary:
 //
 //   NAME CONFIG.yaml [--set key.path=value]... [--out DIR] [--threads N] [--report] [--help]
+//   NAME --schema
 //
 //   int main(int argc, char** argv) {
 //     return uniphy::run_experiment(argc, argv, {"uniphy_simulate", "Simulates ...", ...},

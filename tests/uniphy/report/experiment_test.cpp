@@ -151,6 +151,18 @@ TEST(Experiment, HelpTellsWhatItDoesReadsWritesAndEveryKey) {
   }
 }
 
+TEST(Experiment, SchemaIsPrintedWithoutAConfiguration) {
+  const testing::Scratch scratch;
+  const Result result = run(scratch, {"--schema"});
+  EXPECT_EQ(result.code, 0);
+  EXPECT_EQ(result.err, "");
+  for (const char* part :
+       {"\"title\": \"uniphy_example\"", "\"description\": \"the first number (m)\"",
+        "\"default\": 1", "\"required\": [\n    \"b\"\n  ]"}) {
+    EXPECT_THAT(result.out, HasSubstr(part));
+  }
+}
+
 TEST(Experiment, BadCommandLinesAreRefused) {
   const testing::Scratch scratch;
   scratch.write("c.yaml", "b: 2\n");
