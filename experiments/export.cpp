@@ -88,7 +88,7 @@ int main(int argc, char** argv) {
           metrics.set("weights_bytes", double(std::filesystem::file_size(weights)));
           check(law, model, single, metrics);
           std::printf(
-              "%.0f numbers and %lld codes; law.pt answers like the model to %.1e\n",
+              "%.0f parameters and %lld codes; law.pt answers like the model to %.1e\n",
               *metrics.find("parameters"), static_cast<long long>(model.codes()),
               std::max(*metrics.find("projection_difference"), *metrics.find("stress_difference")));
         };

@@ -59,7 +59,7 @@ RunFunction train_stage(Section& config) {
       const HeldoutFit fit = fit_heldout(heldout, heldout_columns, model, weights, o.fit);
       report_law_errors(heldout, fit.errors, "heldout.", metrics);
     }
-    std::printf("a law of %lld numbers and %lld codes after %lld steps, loss %.4g\n",
+    std::printf("a law of %lld parameters and %lld codes after %lld steps, loss %.4g\n",
                 static_cast<long long>(model.law->parameter_count()),
                 static_cast<long long>(data.trajectories.size()),
                 static_cast<long long>(o.training.steps), result.history.back().loss);
