@@ -18,13 +18,13 @@ except ImportError:
     sys.exit(77)
 
 # What YAML 1.1 takes for something else than a text.
-NAMES = ["yes", "no", "On", "off", "y", "null", "~", "true", "1:20", "1:20:30.5", "0x1F", "0b11", "017",
-         "1_000", "5e-05", ".5", ".inf", "-.INF", ".nan", "2001-01-01", "2001-01-01 10:00:00", "=", "<<",
-         "- a", "a: b", "# a", "%", "@a", "\u03bc\u00b2", "next\u0085line\u2028"]
+NAMES = ["yes", "no", "On", "off", "y", "null", "~", "true", "1:20", "1:20:30.5", "0x1F", "0b11",
+         "017", "1_000", "5e-05", ".5", ".inf", "-.INF", ".nan", "2001-01-01",
+         "2001-01-01 10:00:00", "=", "<<", "- a", "a: b", "# a", "%", "@a", "\u03bc\u00b2", "next\u0085line\u2028"]
 
 
 def number(bits):
-    """A number of the given bits between 1e-250 and 1e250 in size, that means nothing to the run."""
+    """A number of the given bits between 1e-250 and 1e250 in size."""
     value = struct.unpack("<d", struct.pack("<Q", bits.getrandbits(64)))[0]
     return value if 1e-250 < abs(value) < 1e250 else number(bits)
 

@@ -32,7 +32,8 @@ for tag, pattern, first in (
         ("int", r"[-+]?[0-9]+", list("-+0123456789")),
         ("float", r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?|[-+]?\.(inf|Inf|INF)",
          list("-+.0123456789"))):
-    Yaml12.add_implicit_resolver("tag:yaml.org,2002:" + tag, re.compile("^(?:%s)$" % pattern), first)
+    Yaml12.add_implicit_resolver("tag:yaml.org,2002:" + tag, re.compile("^(?:%s)$" % pattern),
+                                 first)
 # A number without a point is one of YAML 1.2, and Python's own reader takes it.
 Yaml12.add_constructor("tag:yaml.org,2002:int", lambda loader, node: int(node.value))
 Yaml12.add_constructor("tag:yaml.org,2002:float",
@@ -109,9 +110,10 @@ def check_shipped(configs, binaries):
 
 
 def check_scene(configs, simulate):
-    """What the configurations do not show: ranges, choices, words, required keys, what a run writes."""
+    """What the configurations do not show: ranges, choices, words, required keys, config.yaml."""
     schema = Schema(simulate)
-    scene = yaml.load((configs / "simulate/benchmark_cube.yaml").read_text(encoding="utf-8"), Yaml12)
+    text = (configs / "simulate/benchmark_cube.yaml").read_text(encoding="utf-8")
+    scene = yaml.load(text, Yaml12)
     for path, value in ((("scene", "grid"), 1), (("scene", "grid"), 20.5), (("scene", "dt"), 0),
                         (("scene", "dt"), "soon"), (("bodies",), []), (("bodies",), None),
                         (("bodies", 0, "shape"), {"type": "bxo"}),
@@ -125,9 +127,10 @@ def check_scene(configs, simulate):
         schema.check(path, with_value(scene, path, value))
     schema.refuse("no bodies", {})
     with tempfile.TemporaryDirectory() as out:
-        done = subprocess.run([str(simulate), str(configs / "simulate/two_bodies.yaml"), "--out", out,
-                               "--set", "scene.duration=none", "--set", "scene.steps=1",
-                               "--set", "output.picture_frames=0"], capture_output=True, text=True)
+        command = [str(simulate), str(configs / "simulate/two_bodies.yaml"), "--out", out]
+        for assignment in ("scene.duration=none", "scene.steps=1", "output.picture_frames=0"):
+            command += ["--set", assignment]
+        done = subprocess.run(command, capture_output=True, text=True)
         assert done.returncode == 0, done.stderr
         text = (pathlib.Path(out) / "config.yaml").read_text(encoding="utf-8")
         schema.check("config.yaml", yaml.load(text, Yaml12))
