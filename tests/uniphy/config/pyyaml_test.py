@@ -20,7 +20,8 @@ except ImportError:
 # What YAML 1.1 takes for something else than a text.
 NAMES = ["yes", "no", "On", "off", "y", "null", "~", "true", "1:20", "1:20:30.5", "0x1F", "0b11",
          "017", "1_000", "5e-05", ".5", ".inf", "-.INF", ".nan", "2001-01-01",
-         "2001-01-01 10:00:00", "=", "<<", "- a", "a: b", "# a", "%", "@a", "\u03bc\u00b2", "next\u0085line\u2028"]
+         "2001-01-01 10:00:00", "=", "<<", "- a", "a: b", "# a", "%", "@a", "\u03bc\u00b2",
+         "next\u0085line\u2028"]
 
 
 def number(bits):
