@@ -13,6 +13,7 @@ packages=(
   libjs-three  # three.js, which plays the motions of report.html
   chromium  # in which a test opens report.html
   python3-torch python3-h5py  # torch.ops.uniphy in tests/python, experiments/algorithm2.py
+  python3-yaml python3-jsonschema  # read what is written as YAML 1.1, hold configs/ to --schema
   python3-numpy python3-mpmath pyflakes3  # coefficients of the activations, lint of Python files
   paraview python3-paraview  # pvpython, whose readers a test tries on a trajectory's XDMF
 )

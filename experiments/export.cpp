@@ -4,6 +4,7 @@
 //   print(m.project(1.1 * torch.eye(3)[None], m.code_of('sand')))"
 
 #include <algorithm>
+#include <cstdio>
 #include <string>
 #include <vector>
 
@@ -86,6 +87,10 @@ int main(int argc, char** argv) {
           metrics.set("law_bytes", double(std::filesystem::file_size(law)));
           metrics.set("weights_bytes", double(std::filesystem::file_size(weights)));
           check(law, model, single, metrics);
+          std::printf(
+              "%.0f parameters and %lld codes; law.pt answers like the model to %.1e\n",
+              *metrics.find("parameters"), static_cast<long long>(model.codes()),
+              std::max(*metrics.find("projection_difference"), *metrics.find("stress_difference")));
         };
       });
 }

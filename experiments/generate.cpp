@@ -1,5 +1,7 @@
 #include "uniphy/data/generate.hpp"
 
+#include <cstdio>
+
 #include "uniphy/report/experiment.hpp"
 
 int main(int argc, char** argv) {
@@ -18,6 +20,8 @@ int main(int argc, char** argv) {
         const uniphy::GenerateOptions options = uniphy::read_generate_options(config);
         return [options](uniphy::RunDirectory& out, uniphy::Metrics& metrics) {
           uniphy::generate_dataset(options, out.config_yaml(), out.file("dataset.h5"), metrics);
+          std::printf("%.0f samples of %.0f trajectories\n", *metrics.find("samples"),
+                      *metrics.find("trajectories"));
         };
       });
 }

@@ -96,10 +96,10 @@ int main(int argc, char** argv) {
             metrics.set("points" + suffix, static_cast<double>(o.points()));
             metrics.set("frames" + suffix, static_cast<double>(o.frames));
             metrics.set("noise" + suffix, o.noise);
-            std::printf("%s%lld points in %lld frames, noise %.3g m: %s\n",
+            std::printf("%s%lld points in %lld frames, noise %.3g m\n",
                         name.empty() ? "" : (name + ": ").c_str(),
                         static_cast<long long>(o.points()), static_cast<long long>(o.frames),
-                        o.noise, out.file("observation.h5").c_str());
+                        o.noise);
           }
         };
       });

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "ops/kernels/base/error.hpp"
+#include "uniphy/config/schema.hpp"
 #include "uniphy/config/state.hpp"
 
 namespace uniphy {
@@ -60,11 +61,16 @@ void refuse_unread(const Node& given, const Node& resolved, const std::vector<st
   }
 }
 
-/// An override without a value takes a key back; one of a key that nobody knows is a slip.
+/// An override without a value takes a key back. Where the document does not give the key, it is
+/// one that a reader knows, or a slip.
 void refuse_unknown(const std::vector<std::string>& taken_back, const Node& resolved,
                     const std::vector<std::string>& absent) {
-  for (const std::string& path : taken_back) {
-    if (std::find(absent.begin(), absent.end(), path) != absent.end()) continue;
+  for (const std::string& assignment : taken_back) {
+    const std::string path = assignment.substr(0, assignment.find('='));
+    const bool known = std::any_of(absent.begin(), absent.end(), [&](const std::string& other) {
+      return path == other || path.rfind(other + ".", 0) == 0;
+    });
+    if (known) continue;
     const Node* node = &resolved;
     for (std::size_t start = 0; node && start <= path.size();) {
       const std::size_t end = std::min(path.find('.', start), path.size());
@@ -78,7 +84,7 @@ void refuse_unknown(const std::vector<std::string>& taken_back, const Node& reso
       }
       start = end + 1;
     }
-    if (!node) throw Error(fmt::format("--set {}=: {}: unknown key", path, path));
+    if (!node) throw Error(fmt::format("--set {}: {}: unknown key", assignment, path));
   }
 }
 
@@ -97,9 +103,7 @@ std::vector<std::string> wrap(const std::string& text, std::size_t width) {
 
 void apply_overrides(const std::vector<std::string>& overrides, Config::State& state) {
   for (const std::string& assignment : overrides) {
-    if (!apply_override(*state.given, assignment)) {
-      state.taken_back.push_back(assignment.substr(0, assignment.find('=')));
-    }
+    if (!apply_override(*state.given, assignment)) state.taken_back.push_back(assignment);
   }
 }
 
@@ -149,13 +153,16 @@ Config Config::parse(const std::string& text, const std::string& name,
 Config Config::describe() {
   auto state = std::make_shared<State>();
   state->describing = true;
+  state->schema = std::make_shared<SchemaMap>();
   state->given = std::make_shared<Node>();
   state->given->kind = Node::Kind::map;
   state->given->origin = "(describing)";
   return Config(state);
 }
 
-Section Config::root() const { return Section(state_, state_->given, state_->resolved, ""); }
+Section Config::root() const {
+  return Section(state_, state_->given, state_->resolved, "", state_->schema);
+}
 
 bool Config::describing() const { return state_->describing; }
 
@@ -168,6 +175,10 @@ void Config::finish() const {
 std::string Config::resolved() const { return emit_document(*state_->resolved); }
 
 const std::vector<KeyInfo>& Config::keys() const { return state_->keys; }
+
+std::string Config::schema(const std::string& title, const std::string& description) const {
+  return json_schema(state_->schema ? *state_->schema : SchemaMap(), title, description);
+}
 
 std::string Config::table(int width) const {
   std::size_t path_width = 0;

@@ -3,7 +3,7 @@
 // Configuration where every key is declared in the one place that reads it: the reader gives its
 // type, unit, default, range and one line of documentation. The same code runs on a document (then
 // it checks and returns values) and on no document at all (then it collects the table that --help
-// prints).
+// prints and the JSON Schema that --schema prints).
 //
 //   Config config = Config::load("scene.yaml", {"scene.grid=32"});
 //   Section root = config.root();
@@ -39,6 +39,7 @@ struct KeyInfo {
 };
 
 class Section;
+struct SchemaMap;  // schema.hpp
 
 /// One alternative of Section::variant.
 struct Variant {
@@ -69,6 +70,9 @@ class Config {
   const std::vector<KeyInfo>& keys() const;
   /// The keys as text of at most `width` columns.
   std::string table(int width = 100) const;
+  /// The keys as a JSON Schema (draft 2020-12), by which editors complete and check YAML. Of
+  /// describe() only.
+  std::string schema(const std::string& title, const std::string& description) const;
 
   struct State;
 
@@ -161,13 +165,15 @@ class Section {
  private:
   friend class Config;
   Section(std::shared_ptr<Config::State> state, std::shared_ptr<Node> given,
-          std::shared_ptr<Node> resolved, std::string path);
+          std::shared_ptr<Node> resolved, std::string path,
+          std::shared_ptr<SchemaMap> schema = nullptr);
 
   /// How a value is described in the table and in messages: noun "number", suffix " > 0".
   struct Kind {
     std::string noun;
     std::string suffix;
     std::string unit;
+    std::string schema = "";  ///< JSON Schema of the value; empty for maps and lists of them
     std::string text() const { return noun + suffix; }
   };
 
@@ -180,6 +186,8 @@ class Section {
   /// Records one declaration; returns the resolved node to fill in.
   std::shared_ptr<Node> declare(const std::string& key, const Kind& kind,
                                 const std::string& fallback, const std::string& doc);
+  /// The map that was declared last, in the schema while describing: its keys.
+  std::shared_ptr<SchemaMap> add_map(bool optional);
   [[noreturn]] void refuse(const std::string& key, const Node& node, const Kind& kind) const;
   [[noreturn]] void missing(const std::string& key, const Kind& kind) const;
   /// parse: Node → optional<T>; show: T → YAML text; dummy: what a required key reads as while
@@ -190,7 +198,7 @@ class Section {
   template <class T, class Parse, class Show>
   std::vector<T> sequence(const std::string& key, const Default<std::vector<T>>& fallback,
                           const Kind& kind, const std::string& doc, const Range& sizes,
-                          const T& dummy, Parse parse, Show show);
+                          const T& dummy, Parse parse, Show show, bool unique = false);
   std::vector<double> reals_of(const std::string& key, const Default<std::vector<double>>& fallback,
                                const Range& range, const std::string& unit, const std::string& doc,
                                const Range& sizes);
@@ -199,6 +207,7 @@ class Section {
   std::shared_ptr<Node> given_;     ///< what the document says here
   std::shared_ptr<Node> resolved_;  ///< what was read here, defaults filled in
   std::string path_;
+  std::shared_ptr<SchemaMap> schema_;  ///< while describing: the keys of this map
 };
 
 }  // namespace uniphy

@@ -6,7 +6,7 @@
 #include <yaml-cpp/mark.h>
 #include <yaml-cpp/parser.h>
 
-#include <algorithm>
+#include <cstddef>
 #include <sstream>
 
 #include "ops/kernels/base/error.hpp"
@@ -145,6 +145,26 @@ std::shared_ptr<Node> parse_yaml(const std::string& text, const std::string& nam
   return builder.root();
 }
 
+/// The index that a part of a path names in a list; its length, to append, unless an entry must
+/// `exist`. `fail` gets what was expected otherwise.
+template <class Fail>
+std::size_t index_of(const Node& list, const std::string& key, bool exist, const Fail& fail) {
+  const std::size_t end = list.items.size() + (exist ? 0 : 1);
+  if (end == 0) fail("expected a list with entries, found an empty one");
+  std::size_t index = 0;
+  for (const char c : key) {
+    if (c < '0' || c > '9' || index >= end) {
+      index = end;
+      break;
+    }
+    index = index * 10 + static_cast<std::size_t>(c - '0');
+  }
+  if (index >= end) {
+    fail(fmt::format("expected an index from 0 to {} of a list, found \"{}\"", end - 1, key));
+  }
+  return index;
+}
+
 }  // namespace
 
 std::shared_ptr<Node> Node::find(const std::string& key) const {
@@ -200,6 +220,7 @@ bool apply_override(Node& root, const std::string& assignment) {
     value = std::make_shared<Node>();
     value->origin = origin;
   }
+  const bool takes_back = value->kind == Node::Kind::null;
 
   Node* node = &root;
   std::size_t start = 0;
@@ -213,39 +234,38 @@ bool apply_override(Node& root, const std::string& assignment) {
       fail_at(origin, fmt::format("expected at most {} nested levels", kMaximumDepth));
     }
     std::shared_ptr<Node>* slot = nullptr;
-    if (node->kind == Node::Kind::null) node->kind = Node::Kind::map;
+    std::size_t at = 0;  // of the slot in its map or list
+    if (node->kind == Node::Kind::null) {
+      if (takes_back) return false;
+      node->kind = Node::Kind::map;
+    }
     if (node->kind == Node::Kind::list) {
-      std::size_t index = 0;
-      for (const char c : key) {
-        if (c < '0' || c > '9' || index > node->items.size()) {
-          index = node->items.size() + 1;
-          break;
-        }
-        index = index * 10 + static_cast<std::size_t>(c - '0');
-      }
-      if (index > node->items.size()) {
-        fail_at(origin,
-                fmt::format("{}: expected an index from 0 to {} of a list, found \"{}\"",
-                            path.substr(0, start ? start - 1 : 0), node->items.size(), key));
-      }
-      if (index == node->items.size()) node->items.emplace_back();
-      slot = &node->items[index];
+      at = index_of(*node, key, takes_back, [&](const std::string& expected) {
+        fail_at(origin, path.substr(0, start ? start - 1 : 0) + ": " + expected);
+      });
+      if (at == node->items.size()) node->items.emplace_back();
+      slot = &node->items[at];
     } else if (node->kind == Node::Kind::map) {
-      for (auto& entry : node->entries) {
-        if (entry.first == key) slot = &entry.second;
+      while (at < node->entries.size() && node->entries[at].first != key) ++at;
+      if (at == node->entries.size()) {
+        if (takes_back) return false;
+        node->entries.emplace_back(key, nullptr);
       }
-      if (!slot) slot = &node->entries.emplace_back(key, nullptr).second;
+      slot = &node->entries[at].second;
     } else {
       fail_at(origin, fmt::format("{}: expected a map or a list, found {}",
                                   path.substr(0, start - 1), node->found()));
     }
-    if (last) {
-      if (value->kind == Node::Kind::null && node->kind == Node::Kind::map) {
-        const auto is_it = [&](const auto& entry) { return entry.first == key; };
-        node->entries.erase(std::remove_if(node->entries.begin(), node->entries.end(), is_it),
-                            node->entries.end());
-        return false;
+    if (last && takes_back) {
+      const auto offset = static_cast<std::ptrdiff_t>(at);
+      if (node->kind == Node::Kind::list) {
+        node->items.erase(node->items.begin() + offset);
+      } else {
+        node->entries.erase(node->entries.begin() + offset);
       }
+      return true;
+    }
+    if (last) {
       *slot = value;
       return true;
     }

@@ -43,8 +43,10 @@ std::shared_ptr<Node> parse_document(const std::string& text, const std::string&
 std::shared_ptr<Node> load_document(const std::filesystem::path& file);
 
 /// Applies one `key.path=value` (value in YAML syntax; numbers in the path index lists, the length
-/// of the list appends) to the root map. Maps on the way are made. Without a value the key is taken
-/// out of the map again, and the result is false. Throws Error.
+/// of the list appends) to the root map. Maps on the way are made. `key.path=null` or `key.path=`
+/// takes a key, a whole map or an entry of a list out again, as if the document did not give it;
+/// the entries after one move up. The result is false where there was nothing to take out. Throws
+/// Error.
 bool apply_override(Node& root, const std::string& assignment);
 
 /// The document as YAML that parse_document reads back to the same tree.

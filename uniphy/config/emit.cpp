@@ -1,7 +1,11 @@
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <string_view>
 
 #include "uniphy/config/document.hpp"
 #include "uniphy/config/value.hpp"
+#include "uniphy/io/text_lines.hpp"
 
 namespace uniphy {
 namespace {
@@ -29,21 +33,43 @@ bool looks_typed(const std::string& text) {
          std::find(std::begin(words), std::end(words), lower) != std::end(words);
 }
 
+/// Characters that some reader of YAML refuses or takes for the end of a line, even in quotes:
+/// controls, the marks of Unicode's own lines, paragraphs and byte order, and what is none.
+bool is_special(std::string_view character) {
+  if (character.size() == 1) return character[0] < ' ' || character[0] == 0x7F;
+  if (character.size() == 2) return character[0] == '\xC2' && character[1] < '\xA0';
+  return character == "\xE2\x80\xA8" || character == "\xE2\x80\xA9" ||
+         character == "\xEF\xBB\xBF" || character == "\xEF\xBF\xBE" || character == "\xEF\xBF\xBF";
+}
+
+/// The number of a character of at most three bytes of UTF-8.
+unsigned code_point(std::string_view character) {
+  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(character[i]); };
+  if (character.size() == 1) return byte(0);
+  if (character.size() == 2) return (byte(0) & 0x1Fu) << 6 | (byte(1) & 0x3Fu);
+  return (byte(0) & 0x0Fu) << 12 | (byte(1) & 0x3Fu) << 6 | (byte(2) & 0x3Fu);
+}
+
 std::string quoted(const std::string& text) {
   std::string out = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') {
+  for (std::size_t i = 0; i < text.size();) {
+    const std::size_t length = std::max<std::size_t>(1, utf8_length(text, i));
+    const std::string_view character = std::string_view(text).substr(i, length);
+    if (character == "\"" || character == "\\") {
       out += '\\';
-      out += c;
-    } else if (c == '\n') {
+      out += character;
+    } else if (character == "\n") {
       out += "\\n";
-    } else if (c == '\t') {
+    } else if (character == "\t") {
       out += "\\t";
-    } else if (c == '\r') {
+    } else if (character == "\r") {
       out += "\\r";
+    } else if (is_special(character)) {
+      out += fmt::format("\\u{:04X}", code_point(character));
     } else {
-      out += c;
+      out += character;
     }
+    i += length;
   }
   return out + '"';
 }

@@ -9,6 +9,7 @@
 
 #include "ops/kernels/base/error.hpp"
 #include "uniphy/config/config.hpp"
+#include "uniphy/config/schema.hpp"
 #include "uniphy/config/state.hpp"
 
 namespace uniphy {
@@ -99,7 +100,7 @@ T Section::scalar(const std::string& key, const Default<T>& fallback, const Kind
 template <class T, class Parse, class Show>
 std::vector<T> Section::sequence(const std::string& key, const Default<std::vector<T>>& fallback,
                                  const Kind& element, const std::string& doc, const Range& sizes,
-                                 const T& dummy, Parse parse, Show show) {
+                                 const T& dummy, Parse parse, Show show, bool unique) {
   std::string count;
   if (sizes.low == sizes.high) {
     count = fmt::format("{:g} ", sizes.low);
@@ -110,7 +111,8 @@ std::vector<T> Section::sequence(const std::string& key, const Default<std::vect
   } else if (std::isfinite(sizes.high)) {
     count = fmt::format("at most {:g} ", sizes.high);
   }
-  const Kind kind{fmt::format("list of {}{}s", count, element.noun), element.suffix, element.unit};
+  const Kind kind{fmt::format("list of {}{}s", count, element.noun), element.suffix, element.unit,
+                  list_schema(element.schema, sizes, unique)};
   std::string shown = "required";
   if (fallback.value) {
     std::vector<std::string> parts;
@@ -152,14 +154,14 @@ bool Section::boolean(const std::string& key, Default<bool> fallback, const std:
     if (node.kind != Node::Kind::scalar || node.quoted) return {};
     return parse_boolean(node.text);
   };
-  return scalar<bool>(key, fallback, {"true or false", "", ""}, doc, false, parse,
+  return scalar<bool>(key, fallback, {"true or false", "", "", boolean_schema()}, doc, false, parse,
                       [](bool value) { return scalar_node(value ? "true" : "false", false); });
 }
 
 std::int64_t Section::integer(const std::string& key, Default<std::int64_t> fallback,
                               const Range& range, const std::string& unit, const std::string& doc) {
   return scalar<std::int64_t>(
-      key, fallback, {"integer", range.text(), unit}, doc,
+      key, fallback, {"integer", range.text(), unit, integer_schema(range)}, doc,
       static_cast<std::int64_t>(std::ceil(some_number(range))),
       [&](const Node& node) { return integer_in(node, range); }, plain_integer);
 }
@@ -167,19 +169,21 @@ std::int64_t Section::integer(const std::string& key, Default<std::int64_t> fall
 double Section::real(const std::string& key, Default<double> fallback, const Range& range,
                      const std::string& unit, const std::string& doc) {
   return scalar<double>(
-      key, fallback, {real_noun(range), range.text(), unit}, doc, some_number(range),
-      [&](const Node& node) { return real_in(node, range); }, plain_real);
+      key, fallback, {real_noun(range), range.text(), unit, real_schema(range)}, doc,
+      some_number(range), [&](const Node& node) { return real_in(node, range); }, plain_real);
 }
 
 std::string Section::text(const std::string& key, Default<std::string> fallback,
                           const std::string& doc) {
-  return scalar<std::string>(key, fallback, {"text", "", ""}, doc, "text", text_in, same_text);
+  return scalar<std::string>(key, fallback, {"text", "", "", text_schema()}, doc, "text", text_in,
+                             same_text);
 }
 
 std::string Section::choice(const std::string& key, Default<std::string> fallback,
                             const std::vector<std::string>& names, const std::string& doc) {
   return scalar<std::string>(
-      key, fallback, {fmt::format("one of {}", fmt::join(names, ", ")), "", ""}, doc,
+      key, fallback,
+      {fmt::format("one of {}", fmt::join(names, ", ")), "", "", names_schema(names)}, doc,
       names.empty() ? "" : names.front(), [&](const Node& node) { return name_in(node, names); },
       same_text);
 }
@@ -208,7 +212,7 @@ std::filesystem::path Section::existing_path(const std::string& key,
     return none ? std::optional<std::string>("") : text_in(node);
   };
   const std::string name =
-      scalar<std::string>(key, fallback, {kind, "", ""}, doc, "", parse, same_text);
+      scalar<std::string>(key, fallback, {kind, "", "", text_schema()}, doc, "", parse, same_text);
   if (state_->describing || (name.empty() && may_be_none)) return name;
   std::error_code ignored;
   if (!std::filesystem::exists(name, ignored)) {
@@ -227,10 +231,11 @@ std::optional<double> Section::real_or(const std::string& word, const std::strin
     return number ? std::optional<Value>(number) : std::nullopt;
   };
   const auto show = [&](const Value& value) {
-    return value ? plain_real(*value) : scalar_node(word, false);
+    return value ? plain_real(*value) : same_text(word);
   };
   return scalar<Value>(key, fallback,
-                       {real_noun(range), fmt::format("{} or \"{}\"", range.text(), word), unit},
+                       {real_noun(range), fmt::format("{} or \"{}\"", range.text(), word), unit,
+                        or_word_schema(real_schema(range), word)},
                        doc, Value(), parse, show);
 }
 
@@ -273,8 +278,8 @@ std::vector<double> Section::reals_of(const std::string& key,
                                       const Range& range, const std::string& unit,
                                       const std::string& doc, const Range& sizes) {
   return sequence<double>(
-      key, fallback, {real_noun(range), range.text(), unit}, doc, sizes, some_number(range),
-      [&](const Node& node) { return real_in(node, range); }, plain_real);
+      key, fallback, {real_noun(range), range.text(), unit, real_schema(range)}, doc, sizes,
+      some_number(range), [&](const Node& node) { return real_in(node, range); }, plain_real);
 }
 
 std::array<double, 3> Section::vector3(const std::string& key,
@@ -310,7 +315,7 @@ std::vector<std::int64_t> Section::integers(const std::string& key,
                                             const Range& range, const std::string& unit,
                                             const std::string& doc, const Range& sizes) {
   return sequence<std::int64_t>(
-      key, fallback, {"integer", range.text(), unit}, doc, sizes,
+      key, fallback, {"integer", range.text(), unit, integer_schema(range)}, doc, sizes,
       static_cast<std::int64_t>(std::ceil(some_number(range))),
       [&](const Node& node) { return integer_in(node, range); }, plain_integer);
 }
@@ -318,8 +323,8 @@ std::vector<std::int64_t> Section::integers(const std::string& key,
 std::vector<std::string> Section::texts(const std::string& key,
                                         Default<std::vector<std::string>> fallback,
                                         const std::string& doc, const Range& sizes) {
-  return sequence<std::string>(key, fallback, {"text", "", ""}, doc, sizes, "text", text_in,
-                               same_text);
+  return sequence<std::string>(key, fallback, {"text", "", "", text_schema()}, doc, sizes, "text",
+                               text_in, same_text);
 }
 
 std::vector<std::string> Section::choices(const std::string& key,
@@ -327,9 +332,10 @@ std::vector<std::string> Section::choices(const std::string& key,
                                           const std::vector<std::string>& names,
                                           const std::string& doc, const Range& sizes) {
   const auto values = sequence<std::string>(
-      key, fallback, {"name", fmt::format(" from {}", fmt::join(names, ", ")), ""}, doc, sizes,
-      names.empty() ? "" : names.front(), [&](const Node& node) { return name_in(node, names); },
-      same_text);
+      key, fallback,
+      {"name", fmt::format(" from {}", fmt::join(names, ", ")), "", names_schema(names)}, doc,
+      sizes, names.empty() ? "" : names.front(),
+      [&](const Node& node) { return name_in(node, names); }, same_text, true);
   for (std::size_t i = 0; i < values.size() && !state_->describing; ++i) {
     if (std::count(values.begin(), values.end(), values[i]) > 1) {
       fail(key, fmt::format("expected each name once, found \"{}\" twice", values[i]));

@@ -9,6 +9,7 @@
 
 #include "ops/kernels/base/error.hpp"
 #include "uniphy/config/config.hpp"
+#include "uniphy/config/schema.hpp"
 #include "uniphy/config/state.hpp"
 
 namespace uniphy {
@@ -24,11 +25,13 @@ std::shared_ptr<Node> empty_map(const std::string& origin) {
 }  // namespace
 
 Section::Section(std::shared_ptr<Config::State> state, std::shared_ptr<Node> given,
-                 std::shared_ptr<Node> resolved, std::string path)
+                 std::shared_ptr<Node> resolved, std::string path,
+                 std::shared_ptr<SchemaMap> schema)
     : state_(std::move(state)),
       given_(std::move(given)),
       resolved_(std::move(resolved)),
-      path_(std::move(path)) {}
+      path_(std::move(path)),
+      schema_(std::move(schema)) {}
 
 bool Section::describing() const { return state_->describing; }
 
@@ -54,6 +57,7 @@ std::shared_ptr<Node> Section::declare(const std::string& key, const Kind& kind,
     resolved_->entries.emplace_back(key, node);
     return node;
   }
+  schema_->properties.push_back({key, kind.schema, kind.unit, doc, fallback});
   const KeyInfo row{
       full_path(key), kind.text(), kind.unit,
       fallback,       doc,         fmt::format("{}", fmt::join(state_->variants, ", "))};
@@ -97,6 +101,14 @@ void Section::missing(const std::string& key, const Kind& kind) const {
                           full_path(key), with_article(kind.text()), unit, hint));
 }
 
+std::shared_ptr<SchemaMap> Section::add_map(bool optional) {
+  if (!schema_) return nullptr;
+  SchemaMap::Property& property = schema_->properties.back();
+  property.form = optional ? SchemaMap::Form::optional_section : SchemaMap::Form::section;
+  property.map = std::make_shared<SchemaMap>();
+  return property.map;
+}
+
 Section Section::section(const std::string& key, const std::string& doc) {
   const Kind kind{"map", "", ""};
   auto resolved = declare(key, kind, "", doc);
@@ -107,7 +119,7 @@ Section Section::section(const std::string& key, const std::string& doc) {
   } else if (given->kind != Node::Kind::map) {
     refuse(key, *given, kind);
   }
-  return Section(state_, given, resolved, full_path(key));
+  return Section(state_, given, resolved, full_path(key), add_map(false));
 }
 
 std::optional<Section> Section::optional_section(const std::string& key, const std::string& doc) {
@@ -133,7 +145,7 @@ std::optional<Section> Section::optional_section(const std::string& key, const s
   } else if (given->kind != Node::Kind::map) {
     refuse(key, *given, kind);
   }
-  return Section(state_, given, resolved, full_path(key));
+  return Section(state_, given, resolved, full_path(key), add_map(true));
 }
 
 std::vector<Section> Section::list(const std::string& key, const std::string& doc,
@@ -145,8 +157,11 @@ std::vector<Section> Section::list(const std::string& key, const std::string& do
   resolved->kind = Node::Kind::list;
   std::vector<Section> sections;
   if (state_->describing) {
+    const auto entry = add_map(false);
+    schema_->properties.back().form = SchemaMap::Form::list;
+    schema_->properties.back().sizes = sizes;
     sections.push_back(
-        Section(state_, empty_map(given_->origin), empty_map(""), full_path(key) + "[]"));
+        Section(state_, empty_map(given_->origin), empty_map(""), full_path(key) + "[]", entry));
     return sections;
   }
   const auto given = given_->find(key);
@@ -180,11 +195,19 @@ std::string Section::variant(const std::string& key, Default<std::string> fallba
       docs += fmt::format("; {}: {}", alternative.name, alternative.doc);
   }
   const std::string chosen = choice(key, std::move(fallback), names, docs);
+  const auto keys = schema_;
+  const std::size_t place = keys ? keys->choices.size() : 0;
+  if (keys) keys->choices.push_back({key, {}});
   for (const Variant& alternative : alternatives) {
     if (!state_->describing && alternative.name != chosen) continue;
     state_->variants.push_back(fmt::format("{}: {}", key, alternative.name));
     state_->variant_names.push_back(alternative.name);
+    if (keys) {
+      schema_ = std::make_shared<SchemaMap>();
+      keys->choices[place].alternatives.push_back({alternative.name, alternative.doc, schema_});
+    }
     if (alternative.read) alternative.read(*this);
+    schema_ = keys;
     state_->variants.pop_back();
     state_->variant_names.pop_back();
   }

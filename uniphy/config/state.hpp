@@ -14,9 +14,10 @@ struct Config::State {
   std::shared_ptr<Node> given;
   std::shared_ptr<Node> resolved = std::make_shared<Node>();
   bool describing = false;
-  std::vector<std::string> taken_back;  ///< keys of overrides without a value
+  std::vector<std::string> taken_back;  ///< overrides that found nothing to take back
   std::vector<std::string> absent;    ///< full paths of what may be given and is not in `resolved`
   std::vector<KeyInfo> keys;          ///< filled while describing
+  std::shared_ptr<SchemaMap> schema;  ///< of the root, filled while describing
   std::vector<std::string> outer;     ///< enclosing variants of keys[i], without its innermost one
   std::vector<std::string> variants;  ///< the variants being read, outermost first
   std::vector<std::string> variant_names;  ///< their alternatives: "elastic" for "type: elastic"

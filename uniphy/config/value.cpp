@@ -77,6 +77,7 @@ std::string format_real(double value) {
   if (std::isnan(value)) return ".nan";
   if (std::isinf(value)) return value > 0 ? ".inf" : "-.inf";
   std::string text = fmt::format("{}", value);
+  if (text == "-0") return "-0.0";  // as an integer it would lose its sign
   // 5e-05 is text to readers of YAML 1.1 (PyYAML among them), 5.0e-05 is a number to all.
   const std::size_t exponent = text.find('e');
   if (exponent != text.npos && text.find('.') == text.npos) text.insert(exponent, ".0");

@@ -12,10 +12,11 @@
 #include <chrono>
 #include <csignal>
 #include <cstdio>
-#include <tuple>
+#include <optional>
 
 #include "ops/kernels/base/error.hpp"
 #include "uniphy/io/atomic_file.hpp"
+#include "uniphy/report/directory_listing.hpp"
 #include "uniphy/report/interrupt.hpp"
 #include "uniphy/report/report_writer.hpp"
 
@@ -31,6 +32,7 @@ struct CommandLine {
   int threads = 0;
   bool report = false;
   bool help = false;
+  bool schema = false;
 };
 
 void add_lines(std::string& text, const char* title, const std::vector<std::string>& lines) {
@@ -64,15 +66,26 @@ std::string help_text(const ExperimentInfo& info, const DeclareFunction& declare
   add_lines(
       text, "Options",
       {"--set KEY=VALUE  sets a key over the file, value in YAML (bodies.0.density=500);",
-       "                 KEY= takes it back to its default",
+       "                 KEY=null takes it back, as if the file did not give it; also a whole",
+       "                 section, and an entry of a list (bodies.1=null)",
        fmt::format("--out DIR        output directory, default {}",
                    default_directory(info, "CONFIG")),
        "--threads N      threads, default what OpenMP takes (OMP_NUM_THREADS)",
        "--report         also writes report.html, one file that opens in a browser; needs",
        fmt::format("                 libjs-three, or {} set to three.min.js;", kThreeJsVariable),
-       "                 --no-report takes it back", "--help           this text"});
+       "                 --no-report takes it back",
+       "--schema         prints a JSON Schema of CONFIG.yaml, by which editors complete and check "
+       "it",
+       "--help           this text"});
   add_lines(text, "Examples", info.examples);
   return text + "\nKeys of CONFIG.yaml:\n" + config.table();
+}
+
+std::string schema_text(const ExperimentInfo& info, const DeclareFunction& declare) {
+  Config config = Config::describe();
+  Section root = config.root();
+  declare(root);
+  return config.schema(info.name, info.summary);
 }
 
 /// Throws Error for a malformed command line.
@@ -81,6 +94,7 @@ CommandLine parse_command_line(int argc, const char* const* argv, const Experime
   CLI::App app(info.summary, info.name);
   app.set_help_flag();
   app.add_flag("-h,--help", line.help);
+  app.add_flag("--schema", line.schema);
   app.add_option("CONFIG", line.config);
   app.add_option("--set", line.overrides)->type_size(1)->allow_extra_args(false);
   app.add_option("--out", line.out);
@@ -91,7 +105,7 @@ CommandLine parse_command_line(int argc, const char* const* argv, const Experime
   } catch (const CLI::ParseError& error) {
     throw Error(fmt::format("command line: {}; see {} --help", error.what(), info.name));
   }
-  if (line.help) return line;
+  if (line.help || line.schema) return line;
   if (line.config.empty()) {
     throw Error(fmt::format("command line: expected CONFIG.yaml, found no argument; see {} --help",
                             info.name));
@@ -119,37 +133,41 @@ class Undo {
     }
   }
   /// Call when the frame's own files have been written, and the work begins.
-  void begin() { before_ = listing(); }
+  void begin() { before_.emplace(directory_); }
 
   void run() const {
-    if (listing() != before_) return;  // there are products: they need their configuration
+    // Where there are products, they need their configuration.
+    if (!before_ || !(DirectoryListing(directory_) == *before_)) return;
     std::filesystem::remove(directory_ / kConfig, ignored_);
     for (const auto& [name, text] : kept_) write_text_file(directory_ / name, text);
     for (const auto& d : made_) std::filesystem::remove(d, ignored_);  // if empty
   }
 
+  /// What the work has written, in a line.
+  std::string products() const {
+    std::vector<std::string> names;
+    if (before_) names = DirectoryListing(directory_).changed_since(*before_);
+    const bool report = std::filesystem::exists(directory_ / kReport, ignored_);
+    for (const char* own : {kReport, kMetrics, kConfig}) {
+      names.erase(std::remove(names.begin(), names.end(), own), names.end());
+    }
+    std::string text = joined_names(names, kProducts);
+    for (const char* own : {report ? kReport : "", kMetrics, kConfig}) {
+      if (*own) text += (text.empty() ? "" : ", ") + std::string(own);
+    }
+    return text;
+  }
+
+  static constexpr std::size_t kProducts = 8;  ///< named in the line
   static constexpr const char* kConfig = "config.yaml";
   static constexpr const char* kMetrics = "metrics.json";
   static constexpr const char* kReport = "report.html";
 
  private:
-  using Entry = std::tuple<std::filesystem::path, std::filesystem::file_time_type, std::uintmax_t>;
-  std::vector<Entry> listing() const {
-    std::vector<Entry> all;
-    std::filesystem::recursive_directory_iterator at(directory_, ignored_), end;
-    for (; at != end; at.increment(ignored_)) {
-      const bool file = at->is_regular_file(ignored_);
-      all.emplace_back(at->path(), at->last_write_time(ignored_),
-                       file ? at->file_size(ignored_) : 0);
-    }
-    std::sort(all.begin(), all.end());
-    return all;
-  }
-
   std::filesystem::path directory_;
   std::vector<std::filesystem::path> made_;  ///< innermost first
   std::vector<std::pair<std::string, std::string>> kept_;
-  std::vector<Entry> before_;
+  std::optional<DirectoryListing> before_;
   mutable std::error_code ignored_;
 };
 
@@ -211,6 +229,8 @@ int run(const CommandLine& line, const ExperimentInfo& info, const DeclareFuncti
   metrics.add_resources(start);
   metrics.write(out.file(Undo::kMetrics));
   report.write(out.file(Undo::kReport), resolved, metrics);
+  std::fflush(stderr);
+  std::printf("%s: %s\n", line.out.c_str(), undo.products().c_str());
   return out.no_answer() ? kNoAnswer : 0;
 }
 
@@ -243,6 +263,10 @@ int run_experiment(int argc, const char* const* argv, const ExperimentInfo& info
     const CommandLine line = parse_command_line(argc, argv, info);
     if (line.help) {
       std::fputs(help_text(info, declare).c_str(), stdout);
+      return 0;
+    }
+    if (line.schema) {
+      std::fputs(schema_text(info, declare).c_str(), stdout);
       return 0;
     }
     return run(line, info, declare, start);

@@ -3,6 +3,7 @@
 // The frame of every binary:
 //
 //   NAME CONFIG.yaml [--set key.path=value]... [--out DIR] [--threads N] [--report] [--help]
+//   NAME --schema
 //
 //   int main(int argc, char** argv) {
 //     return uniphy::run_experiment(argc, argv, {"uniphy_simulate", "Simulates ...", ...},
@@ -16,9 +17,9 @@
 //
 // DIR receives config.yaml (resolved: every default filled in) before the work starts, the
 // products, and metrics.json (with wall_s and peak_memory_mb) when it ends well; with --report also
-// report.html (report.hpp), of a run that fails, too, where it has something to show. A run that
-// fails before it has written anything leaves DIR as it found it. A DIR belongs to one run at a
-// time.
+// report.html (report.hpp), of a run that fails, too, where it has something to show. The last line
+// on stdout names DIR and what the run has written there. A run that fails before it has written
+// anything leaves DIR as it found it. A DIR belongs to one run at a time.
 
 #include <filesystem>
 #include <functional>

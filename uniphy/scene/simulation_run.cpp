@@ -255,6 +255,8 @@ void simulate_into(const SceneDescription& scene, const SimulationOutput& output
   if (particle_steps > 0) metrics.set("ns_per_particle_step", 1e9 * seconds / particle_steps);
   draw_frames(out.file("frames.png"), out.file("trajectory.h5"), output);
   reported.show();
+  fmt::print("{} particles, {} steps of {:.4g} s, {} frame{}\n", placed.particles(), placed.steps,
+             placed.grid.dt, writer.frames(), writer.frames() == 1 ? "" : "s");
 }
 
 }  // namespace uniphy

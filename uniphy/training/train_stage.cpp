@@ -2,6 +2,7 @@
 
 #include <ATen/Parallel.h>
 
+#include <cstdio>
 #include <memory>
 
 #include "uniphy/training/heldout_fit.hpp"
@@ -58,6 +59,10 @@ RunFunction train_stage(Section& config) {
       const HeldoutFit fit = fit_heldout(heldout, heldout_columns, model, weights, o.fit);
       report_law_errors(heldout, fit.errors, "heldout.", metrics);
     }
+    std::printf("a law of %lld parameters and %lld codes after %lld steps, loss %.4g\n",
+                static_cast<long long>(model.law->parameter_count()),
+                static_cast<long long>(data.trajectories.size()),
+                static_cast<long long>(o.training.steps), result.history.back().loss);
   };
 }
 

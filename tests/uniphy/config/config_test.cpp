@@ -180,7 +180,9 @@ TEST(Config, SectionFailNamesThePlace) {
 
 TEST(Config, TextThatLooksLikeANumberStaysText) {
   for (const char* text :
-       {"1:30", "0x10", "1_000", "2001-01-01", "no", "On", "y", "5e-05", ".5", "~"}) {
+       {"1:30",  "1:20:30.5", "0x1F", "0b1",   "017",  "1_000", "-1_0", "2001-01-01",
+        "yes",   "no",        "On",   "OFF",   "True", "y",     "Null", "~",
+        "5e-05", ".5",        ".inf", "-.INF", ".nan", "=",     "<<"}) {
     const Config config = Config::parse(std::string("name: \"") + text + "\"\n");
     EXPECT_EQ(config.root().text("name", "", "doc"), text);
     EXPECT_EQ(config.resolved(), std::string("name: \"") + text + "\"\n");
@@ -197,7 +199,43 @@ TEST(Config, AnEmptyOverrideTakesAKeyBack) {
   config.finish();
 }
 
+TEST(Config, WhatIsTakenBackIsAsIfItStoodNotInTheDocument) {
+  const std::string text =
+      "scene: {grid: 9}\nresume: {file: a}\nbodies:\n"
+      "  - {shape: {type: box, size: [1, 2, 3]}, density: 7}\n  - shape: {type: sphere}\n";
+  const Config config = Config::parse(
+      text, "f.yaml",
+      {"scene=null", "resume=null", "bodies.1=null", "bodies.0.shape.type=sphere",
+       // Of the box, which is one no more; and what is known, but not given.
+       "bodies.0.shape.size=null", "verbose=null", "resume.file=null", "bodies.0.shape.radius="});
+  const Example example = read_example(config.root());
+  config.finish();
+  EXPECT_EQ(example.grid, 20);
+  EXPECT_FALSE(example.has_resume);
+  ASSERT_EQ(example.bodies.size(), 1u);
+  EXPECT_EQ(example.bodies[0].radius, 0.2);
+  EXPECT_EQ(example.bodies[0].density, 7);
+
+  // Required keys: the error of a document that lacks them.
+  const auto message = [](const std::string& document, const std::vector<std::string>& overrides) {
+    return testing::error_of(
+        [&] { read_example(Config::parse(document, "f.yaml", overrides).root()); });
+  };
+  EXPECT_EQ(message(text, {"bodies=null"}), message("scene: {}\n", {}));
+  EXPECT_EQ(message(text, {"bodies.1=null", "bodies.0=null"}), message("\n\nbodies: []\n", {}));
+  EXPECT_EQ(
+      message("bodies:\n  - shape: {type: box, size: [1, 2, 3]}\n", {"bodies.0.shape.size=null"}),
+      message("bodies:\n  - shape: {type: box}\n", {}));
+}
+
 TEST(Config, AnEmptyOverrideOfAnUnknownKeyIsRefused) {
+  for (const char* assignment : {"scene.gird=null", "bodies.0.shape.size=null"}) {
+    const Config config = Config::parse(kMinimal, "f.yaml", {assignment});
+    read_example(config.root());
+    const std::string path = std::string(assignment).substr(0, std::string(assignment).find('='));
+    EXPECT_EQ(testing::error_of([&] { config.finish(); }),
+              std::string("--set ") + assignment + ": " + path + ": unknown key");
+  }
   const Config config = Config::parse("grid: 9\n", "f.yaml", {"gird="});
   config.root().integer("grid", 20, any_number(), "", "doc");
   EXPECT_EQ(testing::error_of([&] { config.finish(); }), "--set gird=: gird: unknown key");

@@ -58,6 +58,21 @@ TEST(Document, EmittedTextReadsBackToTheSameTree) {
   EXPECT_EQ(twice->find("odd key")->text, "1");
 }
 
+TEST(Document, EmittedTextEscapesWhatReadersOfYamlStumbleOver) {
+  // Next line, line and paragraph separators, a byte order mark, a control character, no character.
+  const auto root = parse_document(
+      "a: \"\\x01 \\x7F \\x85 \\u009F \\u2028 \\u2029 \\uFEFF \\uFFFE \\uFFFF\"\n"
+      "b: \"\\xA0 \\u03BC \\U0001F600\"\n",
+      "f");
+  const std::string emitted = emit_document(*root);
+  EXPECT_EQ(emitted,
+            "a: \"\\u0001 \\u007F \\u0085 \\u009F \\u2028 \\u2029 \\uFEFF \\uFFFE \\uFFFF\"\n"
+            "b: \"\xC2\xA0 \xCE\xBC \xF0\x9F\x98\x80\"\n");
+  const auto again = parse_document(emitted, "f");
+  EXPECT_EQ(again->find("a")->text, root->find("a")->text);
+  EXPECT_EQ(again->find("b")->text, root->find("b")->text);
+}
+
 TEST(Override, SetsReplacesAndAppends) {
   const auto root = parse_document("scene: {grid: 20}\nbodies:\n  - density: 1\n", "f");
   apply_override(*root, "scene.grid=32");
@@ -67,7 +82,7 @@ TEST(Override, SetsReplacesAndAppends) {
   apply_override(*root, "new.deep.key={a: 1}");
   apply_override(*root, "text=a=b");
   EXPECT_TRUE(apply_override(*root, "gone=1"));
-  EXPECT_FALSE(apply_override(*root, "gone="));
+  EXPECT_TRUE(apply_override(*root, "gone="));
   EXPECT_EQ(root->find("scene")->find("grid")->text, "32");
   EXPECT_EQ(root->find("scene")->find("grid")->origin, "--set scene.grid=32");
   EXPECT_EQ(root->find("scene")->find("gravity")->items[1]->text, "-1");
@@ -76,6 +91,36 @@ TEST(Override, SetsReplacesAndAppends) {
   EXPECT_EQ(root->find("new")->find("deep")->find("key")->find("a")->text, "1");
   EXPECT_EQ(root->find("text")->text, "a=b");
   EXPECT_EQ(root->find("gone"), nullptr);
+}
+
+TEST(Override, TakesBackKeysMapsAndEntries) {
+  const auto root = parse_document(
+      "scene: {grid: 20, dt: 1}\nresume: {file: x}\nlist: [1, 2, 3]\nempty:\nnone: []\n"
+      "bodies:\n  - density: 1\n  - {density: 2, law: {mu: 3}}\n  - density: 3\n",
+      "f");
+  EXPECT_TRUE(apply_override(*root, "scene.grid=null"));
+  EXPECT_TRUE(apply_override(*root, "resume=~"));
+  EXPECT_TRUE(apply_override(*root, "list.0=null"));
+  EXPECT_TRUE(apply_override(*root, "bodies.1.law.mu="));
+  EXPECT_TRUE(apply_override(*root, "bodies.0=null"));
+  EXPECT_TRUE(apply_override(*root, "bodies.1=null"));  // of the two that are left
+  EXPECT_EQ(emit_document(*root),
+            "scene:\n  dt: 1\nlist: [2, 3]\nempty: null\nnone: []\nbodies:\n"
+            "  - density: 2\n    law: {}\n");
+  // What is not there is not made on the way either.
+  const std::string before = emit_document(*root);
+  for (const char* path : {"scene.grid", "resume.file", "resume.deep.key", "empty.key", "new"})
+    EXPECT_FALSE(apply_override(*root, path + std::string("=null"))) << path;
+  EXPECT_EQ(emit_document(*root), before);
+  EXPECT_EQ(testing::error_of([&] { apply_override(*root, "bodies.1=null"); }),
+            "--set bodies.1=null: bodies: expected an index from 0 to 0 of a list, found \"1\"");
+  EXPECT_EQ(testing::error_of([&] { apply_override(*root, "bodies.1.density=null"); }),
+            "--set bodies.1.density=null: bodies: expected an index from 0 to 0 of a list, found "
+            "\"1\"");
+  EXPECT_EQ(testing::error_of([&] { apply_override(*root, "none.0=null"); }),
+            "--set none.0=null: none: expected a list with entries, found an empty one");
+  EXPECT_EQ(testing::error_of([&] { apply_override(*root, "scene.dt.x=null"); }),
+            "--set scene.dt.x=null: scene.dt: expected a map or a list, found \"1\"");
 }
 
 TEST(Document, HostileDocumentsAreRefused) {

@@ -60,6 +60,16 @@ TEST(FormatReal, IsANumberInEveryVersionOfYaml) {
   for (const double value : {5e-5, 1e-300, 1e16, -2e22, 1.25e-7, 0.1, 1000.0, -3.0, 1e15, 1e100}) {
     EXPECT_TRUE(std::regex_match(format_real(value), number)) << format_real(value);
   }
+  std::mt19937_64 bits(2);
+  for (int i = 0; i < 2000; ++i) {
+    const std::uint64_t pattern = bits();
+    double value;
+    std::memcpy(&value, &pattern, sizeof value);
+    if (!std::isfinite(value)) continue;
+    ASSERT_TRUE(std::regex_match(format_real(value), number)) << format_real(value);
+  }
+  EXPECT_EQ(format_real(-0.0), "-0.0");
+  EXPECT_TRUE(std::signbit(*parse_real("-0.0")));
   EXPECT_EQ(format_real(5e-5), "5.0e-05");
   EXPECT_EQ(format_real(1e16), "1.0e+16");
 }

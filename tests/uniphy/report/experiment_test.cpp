@@ -88,6 +88,35 @@ TEST(Experiment, WritesProductResolvedConfigurationAndMetrics) {
   EXPECT_EQ(read_text_file(scratch.file("again/sum.txt")), "7.000000");
 }
 
+TEST(Experiment, TheLastLineSaysWhatCameOutAndWhereItLies) {
+  const testing::Scratch scratch;
+  scratch.write("c.yaml", "b: 2\n");
+  const std::string out = scratch.file("out").string();
+  const std::string whole = out + ": sum.txt, metrics.json, config.yaml\n";
+  EXPECT_EQ(run(scratch, {"@/c.yaml", "--out", "@/out"}).out, whole);
+  // What another program left there is not of this run.
+  scratch.write("out/other.txt", "");
+  EXPECT_EQ(run(scratch, {"@/c.yaml", "--out", "@/out"}).out, whole);
+  EXPECT_EQ(run(scratch, {"@/c.yaml", "--out", "@/out", "--set", "b=776"}).out, whole);
+  EXPECT_EQ(run(scratch, {"@/c.yaml", "--out", "@/out", "--set", "b=9999"}).out, "");
+
+  const DeclareFunction many = [](Section& config) -> RunFunction {
+    config.real("b", required, any_number(), "m", "unused");
+    return [](RunDirectory& directory, Metrics&) {
+      std::printf("all of them\n");
+      for (int i = 0; i < 9; ++i)
+        write_text_file(directory.file("part" + std::to_string(i) + ".txt"), "");
+      make_directory(directory.file("fits"));
+      write_text_file(directory.file("fits/a"), "");
+      write_text_file(directory.file("fits/b"), "");
+    };
+  };
+  EXPECT_EQ(run(scratch, {"@/c.yaml", "--out", "@/out"}, many).out,
+            "all of them\n" + out +
+                ": fits/ (2 files), part0.txt, part1.txt, part2.txt, part3.txt, part4.txt, "
+                "part5.txt, part6.txt and 2 more, metrics.json, config.yaml\n");
+}
+
 TEST(Experiment, ARunWithoutAnAnswerWritesAllAndHasACodeOfItsOwn) {
   const testing::Scratch scratch;
   write_text_file(scratch.file("c.yaml"), "b: 776\n");
@@ -119,6 +148,18 @@ TEST(Experiment, HelpTellsWhatItDoesReadsWritesAndEveryKey) {
           "finite number (m), required"}) {
       EXPECT_THAT(result.out, HasSubstr(part));
     }
+  }
+}
+
+TEST(Experiment, SchemaIsPrintedWithoutAConfiguration) {
+  const testing::Scratch scratch;
+  const Result result = run(scratch, {"--schema"});
+  EXPECT_EQ(result.code, 0);
+  EXPECT_EQ(result.err, "");
+  for (const char* part :
+       {"\"title\": \"uniphy_example\"", "\"description\": \"the first number (m)\"",
+        "\"default\": 1", "\"required\": [\n    \"b\"\n  ]"}) {
+    EXPECT_THAT(result.out, HasSubstr(part));
   }
 }
 
