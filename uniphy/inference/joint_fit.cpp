@@ -72,7 +72,7 @@ class JointFit::Problem {
     return torch::cat({code(point, k), point.slice(0, first, first + own_[k]->motion_size())});
   }
 
-  /// Where every row of `pull` of a code and of an initial state draws at, and how strongly.
+  /// Holds codes to where they begin and initial states to those of the first frames.
   Pull pull(const Tensor& at) const {
     std::vector<Tensor> to, weight;
     for (std::size_t k = 0; k < bodies_.size(); ++k) {

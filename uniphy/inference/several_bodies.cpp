@@ -110,7 +110,7 @@ class BodiesFit {
     for (std::size_t b = 0; b < bodies_.size(); ++b) groups[group_[b]].push_back(b);
     for (const auto& [number, members] : groups) {
       if (members.size() > 1) fit_together(members);
-      // No wall or other body, or more freedom than z is asked for and there is need of it.
+      // Alone, or where more freedom than z is allowed and needed.
       if (members.size() == 1 || !joint_does(members)) last_fits(members);
     }
     return finish();
@@ -156,10 +156,15 @@ class BodiesFit {
     std::vector<double> meeting(bodies_.size(), kInfinity);
     for (std::size_t a = 0; a < bodies_.size(); ++a) {
       for (std::size_t b = a + 1; b < bodies_.size(); ++b) {
-        const std::int64_t frame = first_meeting(paths[a], paths[b], grid_);
+        const Observation &of_a = bodies_[a].observation, &of_b = bodies_[b].observation;
+        std::int64_t frame = first_meeting(paths[a], paths[b], grid_);
+        // Points that are seen tell it whatever the laws of now say.
+        const std::int64_t seen =
+            first_meeting({of_a.frames, of_a.x}, {of_b.frames, of_b.x}, grid_);
+        if (seen >= 0) frame = frame < 0 ? seen : std::min(frame, seen);
         if (frame < 0) continue;
         meets[a][b] = meets[b][a] = true;
-        const std::vector<double>& time = bodies_[a].observation.time;
+        const std::vector<double>& time = of_a.time;
         for (const std::size_t k : {a, b})
           meeting[k] = std::min(meeting[k], time[std::max<std::int64_t>(frame - 1, 0)] - time[0]);
       }
@@ -265,13 +270,13 @@ class BodiesFit {
     fit_jointly(members);
   }
 
+  /// Whether the joint fit is the last word: it explains all motions, or nothing else may be tried.
   bool joint_does(const Members& members) const {
     const bool climbs = adaptation_.rungs.size() > 1 && can_be_adapted(variables_);
     return std::all_of(members.begin(), members.end(),
                        [&](std::size_t b) { return bodies_[b].explained || !climbs; });
   }
 
-  /// Where that explains all motions or nothing else is to be tried, with the posterior.
   void fit_jointly(const Members& members) {
     std::vector<JointBody> bodies;
     for (const std::size_t k : members) {

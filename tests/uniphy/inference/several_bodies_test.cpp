@@ -232,6 +232,23 @@ TEST(SeveralBodies, EachOfTwoThatTouchGetsItsCode) {
   EXPECT_GT(std::sqrt(alone.fit_mse) / alone.size, 5e-3);
 }
 
+TEST(SeveralBodies, TheyMayBeTrackedPoints) {
+  const Fits fits;
+  const Pile pile(fits.law(2), fits.law(5));
+  LaboratoryView view;
+  view.share = 0.3;
+  view.stride = 2;
+  std::vector<ObservedBody> seen;
+  for (const ObservedBody& b : pile.bodies)
+    seen.push_back({b.name, laboratory_view(b.motion, view)});
+  const BodiesInference found = fits.fit(seen, quiet());
+  EXPECT_EQ(found.group, (std::vector<int>{0, 0}));
+  for (const Inference& body : found.bodies) {
+    EXPECT_TRUE(body.seen.tracked());
+    EXPECT_LT(std::sqrt(body.fit_mse) / body.size, 3e-3);  // a tracer is not its particle
+  }
+}
+
 TEST(SeveralBodies, OnesThatNeverMeetAreFittedEachForItself) {
   const Fits fits;
   const Pile pile(fits.law(2), fits.law(5), 41, 0.22);
