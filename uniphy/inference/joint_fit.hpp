@@ -2,6 +2,7 @@
 
 #include <torch/types.h>
 
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -16,7 +17,8 @@ struct JointBody {
   Observation seen;  ///< the starts of its points move with the fit
   torch::Tensor u;   ///< [size] of the variables
   InitialState motion;
-  double loss = 0;           ///< mse over size², of the end
+  /// mse over size², of the end; infinite where the roll-out fails from the start on.
+  double loss = std::numeric_limits<double>::infinity();
   double enough = 0;         ///< over size, of a motion that counts as explained
   bool fits_starts = false;  ///< FitProblem::fits_starts
   /// Of its own numbers, those of the other bodies integrated out, see JointFit::add_posterior.
